@@ -1,0 +1,136 @@
+"""The configuration of a run: all that the learner, its actors and an evaluation must agree on."""
+
+from dataclasses import asdict, dataclass, fields
+from typing import Any, Final, get_args
+
+from hoz_dist.errors import InvalidValueError, UnknownNameError
+from hoz_dist.graph.planner import EdgeCost
+from hoz_dist.policy.settings import EncoderName, Method, PolicySettings, Preset
+
+PRESET_LEARNING_RATES: Final[dict[Preset, float]] = {"compact": 1e-3, "paper": 1e-4}
+"""Adam's learning rate at the start; the paper's is 1e-4."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunConfig:
+    """One run's configuration; validated at construction.
+
+    Raises:
+        InvalidValueError: A value is out of its range.
+        UnknownNameError: A method, preset, encoder or edge cost does not exist.
+    """
+
+    method: Method = "hoz"
+    preset: Preset = "compact"
+    encoder: EncoderName = "pooled"
+    encoder_key: str = "pooled-1-g7"
+    """Names the encoder's version and weights: actors with others are refused."""
+    channels: int = 6
+    """C, features of a grid cell of the encoder."""
+    picture_size: int = 84
+    """Side of the camera's picture, pixels."""
+    zones: int = 8
+    """K, zones of a graph."""
+    edge_cost: EdgeCost = "normalized"
+    seed: int = 0
+    batch: int = 64
+    """B, episodes that an actor runs at once."""
+    rollout_steps: int = 20
+    """T, steps of a rollout."""
+    discount: float = 0.99
+    gae_lambda: float = 0.95
+    entropy_weight: float = 0.02
+    """Weight of the entropy bonus at the start; falls with the learning rate to a tenth of it."""
+    value_weight: float = 0.5
+    scene_weight: float = 0.1
+    """Weight of the scene layer's cross-entropy."""
+    learning_rate: float = 1e-3
+    """Adam's learning rate at the start; falls linearly to 0 over the budget, if there is one."""
+    gradient_norm: float = 1.0
+    """Largest norm of a gradient; a larger one is scaled down."""
+    max_lag: int = 32
+    """Largest policy lag, versions, at which a gradient is applied."""
+    minutes: float | None = None
+    """Budget of training time, minutes."""
+    frames: int | None = None
+    """Budget of environment frames."""
+
+    def __post_init__(self) -> None:
+        """Check every field."""
+        for name, value, known in (
+            ("method", self.method, get_args(Method)),
+            ("preset", self.preset, get_args(Preset)),
+            ("encoder", self.encoder, get_args(EncoderName)),
+            ("edge cost", self.edge_cost, get_args(EdgeCost)),
+        ):
+            if value not in known:
+                raise UnknownNameError.of(name, str(value), known)
+        for name, low, high in _RANGES:
+            value = getattr(self, name)
+            if value is not None and not (low <= value <= high):
+                message = f"'{name}' is {value}; it must be from {low:g} to {high:g}."
+                raise InvalidValueError(message)
+        if self.minutes is not None and self.frames is not None:
+            message = "A run's budget is either minutes or frames; give one of them."
+            raise InvalidValueError(message)
+
+    @property
+    def policy(self) -> PolicySettings:
+        """The settings of the policy network."""
+        return PolicySettings.of(self.method, self.preset, channels=self.channels)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the configuration as JSON values."""
+        return asdict(self)
+
+    @classmethod
+    def from_json(cls, values: object) -> "RunConfig":
+        """Read a configuration.
+
+        Args:
+            values: What `to_json` returned, perhaps by way of a file or the network.
+
+        Raises:
+            InvalidValueError: A field is missing, unknown, of the wrong type or out of range.
+            UnknownNameError: A method, preset, encoder or edge cost does not exist.
+        """
+        known = {field.name: field for field in fields(cls)}
+        if not isinstance(values, dict) or set(values) != set(known):
+            given = set(values) if isinstance(values, dict) else set()
+            wrong = sorted(str(name) for name in given ^ set(known))
+            message = f"Not a configuration of this version of hoz-dist; missing or unknown: {', '.join(wrong) or 'all'}."
+            raise InvalidValueError(message)
+        for name, value in values.items():
+            default = known[name].default
+            optional = name in {"minutes", "frames"}
+            expected = (float, int) if isinstance(default, float) or name == "minutes" else (int if optional else type(default))
+            if isinstance(value, bool) or not (isinstance(value, expected) or (optional and value is None)):
+                message = f"'{name}' of the configuration is {value!r}, which is of the wrong type."
+                raise InvalidValueError(message)
+        return cls(**values)
+
+    def differences(self, other: "RunConfig") -> list[str]:
+        """Name the fields in which two configurations differ, each as ``name: mine, other's``."""
+        mine, theirs = self.to_json(), other.to_json()
+        return [f"{name}: {mine[name]!r}, {theirs[name]!r}" for name in mine if mine[name] != theirs[name]]
+
+
+_RANGES: Final = (
+    ("channels", 1, 4096),
+    ("picture_size", 16, 512),
+    ("zones", 2, 64),
+    ("seed", 0, 2**31 - 1),
+    ("batch", 1, 4096),
+    ("rollout_steps", 1, 1000),
+    ("discount", 0.0, 1.0),
+    ("gae_lambda", 0.0, 1.0),
+    ("entropy_weight", 0.0, 10.0),
+    ("value_weight", 0.0, 10.0),
+    ("scene_weight", 0.0, 10.0),
+    ("learning_rate", 1e-8, 1.0),
+    ("gradient_norm", 1e-3, 1e6),
+    ("max_lag", 0, 100_000),
+    ("minutes", 0.01, 1e6),
+    ("frames", 1, 10**15),
+)
+"""Field, least value, largest value."""

@@ -1,0 +1,44 @@
+"""A network's parameters and gradients as one flat vector each.
+
+The vector is what the optimiser steps, what is sent, and what a checkpoint holds, so nothing is gathered or copied
+between those.
+"""
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import nn
+
+
+class FlatParameters:
+    """Moves a module's parameters, and their gradients, into one contiguous float32 tensor each.
+
+    Parameters keep the order of ``module.parameters()``. The module's tensors become views of `values` and
+    `gradients`: changing one changes the other.
+    """
+
+    def __init__(self, module: nn.Module) -> None:
+        parameters = list(module.parameters())
+        self.values = torch.empty(sum(p.numel() for p in parameters))
+        self.gradients = torch.zeros_like(self.values)
+        start = 0
+        for parameter in parameters:
+            end = start + parameter.numel()
+            self.values[start:end] = parameter.detach().flatten()
+            parameter.data = self.values[start:end].view_as(parameter)
+            parameter.grad = self.gradients[start:end].view_as(parameter)
+            start = end
+
+    def load(self, vector: NDArray[np.float32]) -> None:
+        """Replace the parameters.
+
+        Args:
+            vector: All parameters, [P].
+
+        Raises:
+            ValueError: The vector has another length.
+        """
+        if vector.shape != tuple(self.values.shape):
+            message = f"expected {tuple(self.values.shape)} parameters, got {vector.shape}"
+            raise ValueError(message)
+        self.values.numpy()[:] = vector

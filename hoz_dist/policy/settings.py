@@ -1,0 +1,66 @@
+"""What shapes a policy network: method, preset and layers."""
+
+from dataclasses import dataclass
+from typing import Final, Literal
+
+Method = Literal["a3c", "object", "hoz"]
+Preset = Literal["compact", "paper"]
+EncoderName = Literal["pooled", "resnet18"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sizes:
+    """Layer sizes of a preset."""
+
+    trunk: Literal["vector", "grid"]
+    """How the inputs join: as vectors, or as maps of a 7 x 7 grid (the paper's)."""
+    picture: int
+    """Features of the picture (per grid cell in a grid trunk)."""
+    target: int
+    """Features of the target indicator."""
+    action: int
+    """Features of the previous action."""
+    objects: int
+    """D_o, columns of W_o in Eq. 6."""
+    zones: int
+    """D_z, columns of W_z in Eq. 5."""
+    lstm: int
+    """Cells of an LSTM layer."""
+    lstm_layers: int
+
+
+PRESETS: Final[dict[Preset, Sizes]] = {
+    "compact": Sizes(
+        trunk="vector", picture=64, target=16, action=8, objects=16, zones=32, lstm=128, lstm_layers=1
+    ),
+    # 49 object features: H_o' f^v then has one row per cell of the 7 x 7 grid, as in the released code.
+    "paper": Sizes(trunk="grid", picture=64, target=10, action=10, objects=49, zones=10, lstm=512, lstm_layers=2),
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class PolicySettings:
+    """Everything that shapes the network; two networks of equal settings have equal parameter vectors."""
+
+    sizes: Sizes
+    channels: int
+    """C of the visual encoder."""
+    grid: int = 7
+    """G of the visual encoder."""
+    object_layer: bool = True
+    scene_layer: bool = True
+    zone_layer: bool = True
+    done_reminder: bool = True
+
+    @classmethod
+    def of(cls, method: Method, preset: Preset, *, channels: int) -> "PolicySettings":
+        """Return the settings of a method: ``a3c`` < ``object`` < ``hoz``, each with more layers."""
+        hoz = method == "hoz"
+        return cls(
+            sizes=PRESETS[preset],
+            channels=channels,
+            object_layer=method != "a3c",
+            scene_layer=hoz,
+            zone_layer=hoz,
+            done_reminder=hoz,
+        )
