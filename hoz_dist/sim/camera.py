@@ -1,0 +1,79 @@
+"""The agent's camera: colours, depth and segmentation of a pose, drawn on the CPU."""
+
+from typing import Final, NamedTuple
+
+import numpy as np
+import pybullet
+from numpy.typing import NDArray
+
+from hoz_dist.nav.pose import CAMERA_HEIGHT_M, FIELD_OF_VIEW_DEG, Pose
+from hoz_dist.sim.world import World
+
+DEFAULT_SIZE: Final = 84
+"""Side of a picture, pixels."""
+NEAR_M: Final = 0.05
+FAR_M: Final = 20.0
+_LIGHT_DIRECTION: Final = (1.0, -2.0, 3.0)
+"""Towards the light, (x, z, height); oblique, so that the faces of a box differ."""
+_AMBIENT: Final = 0.62
+_DIFFUSE: Final = 0.42
+
+
+class Frame(NamedTuple):
+    """What the camera sees from one pose."""
+
+    rgb: NDArray[np.uint8]
+    """Colours, [S, S, 3]."""
+    depth: NDArray[np.float32]
+    """Distance along the viewing axis, metres, [S, S]."""
+    segmentation: NDArray[np.uint8]
+    """Index of the room's item plus 1, 0 where there is nothing, [S, S]."""
+
+
+class Camera:
+    """Draws the world from poses of the agent with PyBullet's TinyRenderer: no display and no GPU needed."""
+
+    def __init__(self, world: World, size: int = DEFAULT_SIZE) -> None:
+        """Look into a world.
+
+        Args:
+            world: The world; it may load other rooms later.
+            size: Side of the square pictures, pixels.
+        """
+        self.world = world
+        self.size = size
+        self._projection = pybullet.computeProjectionMatrixFOV(FIELD_OF_VIEW_DEG, 1.0, NEAR_M, FAR_M)
+
+    def render(self, pose: Pose) -> Frame:
+        """Draw what an agent at a pose sees."""
+        yaw, pitch = np.deg2rad(pose.yaw), np.deg2rad(pose.pitch)
+        eye = (pose.x, pose.z, CAMERA_HEIGHT_M)
+        ahead = (np.sin(yaw) * np.cos(pitch), np.cos(yaw) * np.cos(pitch), -np.sin(pitch))
+        aim = [float(e + a) for e, a in zip(eye, ahead, strict=True)]
+        view = pybullet.computeViewMatrix(eye, aim, (0.0, 0.0, 1.0))
+        _, _, colours, buffer, bodies = pybullet.getCameraImage(
+            self.size,
+            self.size,
+            view,
+            self._projection,
+            shadow=0,
+            lightDirection=_LIGHT_DIRECTION,
+            lightColor=(1.0, 1.0, 1.0),
+            lightAmbientCoeff=_AMBIENT,
+            lightDiffuseCoeff=_DIFFUSE,
+            lightSpecularCoeff=0.0,
+            renderer=pybullet.ER_TINY_RENDERER,
+            physicsClientId=self.world.client,
+        )
+        shape = (self.size, self.size)
+        rgb = np.ascontiguousarray(np.reshape(colours, (*shape, 4))[..., :3], dtype=np.uint8)
+        # The buffer b in [0, 1] of an OpenGL projection: depth = far near / (far - (far - near) b).
+        depth = FAR_M * NEAR_M / (FAR_M - (FAR_M - NEAR_M) * np.reshape(buffer, shape).astype(np.float64))
+        return Frame(rgb, depth.astype(np.float32), self._labels(np.reshape(bodies, shape)))
+
+    def _labels(self, bodies: NDArray[np.int32]) -> NDArray[np.uint8]:
+        """Turn PyBullet body ids (-1: nothing), [S, S], into item indices plus 1."""
+        table = np.zeros(max(self.world.body_items, default=0) + 2, dtype=np.uint8)
+        for body, item in self.world.body_items.items():
+            table[body + 1] = item + 1
+        return table[bodies + 1]
