@@ -1,0 +1,1 @@
+"""The learner process: applies gradients, publishes parameters, merges and serves graphs, and checkpoints."""
