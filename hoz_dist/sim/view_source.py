@@ -1,0 +1,64 @@
+"""Where observations come from: stored views (a look-up), or PyBullet at every step (`hoz_dist.sim.live`)."""
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hoz_dist.sim.observation import Sight
+from hoz_dist.sim.room_views import RoomViews
+from hoz_dist.sim.row_table import RowTable
+
+
+class ViewSource(Protocol):
+    """Shows the views of rooms; a view's index counts on over the rooms in the order in which they were added."""
+
+    def add_room(self, views: RoomViews) -> None:
+        """Append the views of a room."""
+        ...
+
+    def look(self, views: NDArray[np.int64]) -> Sight:
+        """Show what the agent sees at views [...] now."""
+        ...
+
+    def recall(self, views: NDArray[np.int64]) -> Sight:
+        """Show again what was seen at views [...] of a whole rollout."""
+        ...
+
+    def succeeds(self, views: NDArray[np.int64], targets: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Tell whether Done succeeds at views [M], which were looked at last, with targets [M]."""
+        ...
+
+
+class StoredViews:
+    """Observations by index look-up in arrays."""
+
+    def __init__(self) -> None:
+        """Make a source without rooms."""
+        self._features: RowTable[np.float16] = RowTable()
+        self._detections: RowTable[np.float32] = RowTable()
+        self._appearance: RowTable[np.float16] = RowTable()
+        self._success: RowTable[np.bool_] = RowTable()
+
+    def add_room(self, views: RoomViews) -> None:
+        """Append the views of a room."""
+        self._features.append(views.features)
+        self._detections.append(views.detections)
+        self._appearance.append(views.appearance)
+        self._success.append(views.success)
+
+    def look(self, views: NDArray[np.int64]) -> Sight:
+        """Look views [...] up."""
+        return Sight(
+            features=self._features.take(views).astype(np.float32),
+            detections=self._detections.take(views),
+            appearance=self._appearance.take(views).astype(np.float32),
+        )
+
+    def recall(self, views: NDArray[np.int64]) -> Sight:
+        """Look views [...] up again."""
+        return self.look(views)
+
+    def succeeds(self, views: NDArray[np.int64], targets: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Look up whether Done succeeds at views [M] with targets [M]."""
+        return self._success.take(views)[np.arange(len(views)), targets]
