@@ -1,1 +1,1 @@
-"""The actor process: explores rooms, rolls out episodes, computes gradients and keeps parameters and graphs fresh."""
+"""The actor process: explores rooms, rolls out episodes, computes gradients and pushes them to the learner."""

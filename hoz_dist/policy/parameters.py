@@ -9,6 +9,9 @@ import torch
 from numpy.typing import NDArray
 from torch import nn
 
+from hoz_dist.config import RunConfig
+from hoz_dist.policy.actor_critic import ActorCritic
+
 
 class FlatParameters:
     """Moves a module's parameters, and their gradients, into one contiguous float32 tensor each.
@@ -42,3 +45,16 @@ class FlatParameters:
             message = f"expected {tuple(self.values.shape)} parameters, got {vector.shape}"
             raise ValueError(message)
         self.values.numpy()[:] = vector
+
+
+def make_policy(config: RunConfig) -> ActorCritic:
+    """Make the network of a run, with the initial parameters that follow from its seed."""
+    # A generator of its own would have to reach every layer's initialisation; forking keeps the caller's stream intact.
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(config.seed)
+        return ActorCritic(config.policy, config.zones)
+
+
+def initial_parameters(config: RunConfig) -> NDArray[np.float32]:
+    """Return the initial parameters of a run, [P]; they follow from the configuration alone."""
+    return FlatParameters(make_policy(config)).values.numpy()

@@ -1,0 +1,72 @@
+"""The loss of A3C (Mnih et al. 2016, Algorithm S3), and of the scene layer."""
+
+from typing import NamedTuple
+
+import torch
+from torch import Tensor
+from torch.nn import functional
+
+from hoz_dist.a3c.returns import generalized_advantages
+from hoz_dist.a3c.rollout import Rollout
+
+ADVANTAGE_FLOOR = 0.05
+"""Least scale by which advantages are divided, so that noise is not blown up when nothing differs."""
+
+
+class LossWeights(NamedTuple):
+    """Factors of the loss's terms."""
+
+    discount: float
+    gae_lambda: float
+    value: float
+    entropy: float
+    scene: float
+
+
+class Loss(NamedTuple):
+    """The loss and its terms, scalars; only `total` carries a gradient."""
+
+    total: Tensor
+    policy: float
+    value: float
+    entropy: float
+    scene: float
+
+
+def a3c_loss(
+    rollout: Rollout,
+    logits: Tensor,
+    values: Tensor,
+    weights: LossWeights,
+    scene_logits: Tensor | None = None,
+    scenes: Tensor | None = None,
+) -> Loss:
+    """Compute the loss of a rollout, averaged over its valid steps.
+
+    Advantages are divided by their standard deviation in the rollout: success comes rarely at first and often later, and
+    the entropy bonus keeps its meaning against either.
+
+    Args:
+        rollout: T steps of B episodes.
+        logits: Of the policy at each step, [T, B, actions].
+        values: Of the critic at each step, [T, B].
+        weights: Factors of the terms.
+        scene_logits: Of the scene layer, [T, B, S], if it is on.
+        scenes: True scenes, int64 [T, B], the labels of `scene_logits`.
+    """
+    valid = rollout.valid.float()
+    count = valid.sum().clamp(min=1.0)
+    advantages, returns = generalized_advantages(rollout, weights.discount, weights.gae_lambda)
+    scale = advantages[rollout.valid].std(correction=0).clamp(min=ADVANTAGE_FLOOR)
+
+    log_probabilities = functional.log_softmax(logits, dim=-1)
+    chosen = log_probabilities.gather(-1, rollout.actions.unsqueeze(-1)).squeeze(-1)
+    policy = -(chosen * (advantages / scale) * valid).sum() / count
+    value = 0.5 * ((values - returns).square() * valid).sum() / count
+    entropy = -((log_probabilities.exp() * log_probabilities).sum(-1) * valid).sum() / count
+    total = policy + weights.value * value - weights.entropy * entropy
+    scene = torch.zeros(())
+    if scene_logits is not None and scenes is not None:
+        scene = functional.cross_entropy(scene_logits.flatten(0, 1), scenes.flatten())
+        total = total + weights.scene * scene
+    return Loss(total, policy.item(), value.item(), entropy.item(), scene.item())

@@ -1,0 +1,1 @@
+"""Evaluation of agents on a fixed list of episodes, every one of which counts."""

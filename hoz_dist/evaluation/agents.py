@@ -1,0 +1,99 @@
+"""The agents that can be evaluated: a trained policy, the floor (Random) and the ceiling (Oracle)."""
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hoz_dist.nav.actions import Action
+from hoz_dist.policy.actor_critic import ActorCritic
+from hoz_dist.policy.graph_bank import GraphBank
+from hoz_dist.policy.sampling import sample_actions
+from hoz_dist.sim.episode_runner import EpisodeRunner
+from hoz_dist.sim.room_views import RoomViews
+
+
+class Agent(Protocol):
+    """Chooses the actions of a batch of episodes."""
+
+    name: str
+
+    def begin(self, runner: EpisodeRunner, rng: np.random.Generator) -> None:
+        """Prepare for the episodes of a runner, none of which has made a step yet."""
+        ...
+
+    def act(self, runner: EpisodeRunner) -> NDArray[np.int64]:
+        """Choose an action for each episode, [B]; those of ended episodes are ignored."""
+        ...
+
+
+class RandomAgent:
+    """Draws each of the six actions with equal probability: the floor."""
+
+    name = "random"
+
+    def begin(self, runner: EpisodeRunner, rng: np.random.Generator) -> None:
+        """Prepare for the episodes of a runner."""
+        self._batch, self._rng = len(runner.episodes), rng
+
+    def act(self, runner: EpisodeRunner) -> NDArray[np.int64]:
+        """Choose an action for each episode, [B]."""
+        del runner
+        return self._rng.integers(len(Action), size=self._batch)
+
+
+class OracleAgent:
+    """Follows a shortest path, which it is told, and says Done: the ceiling."""
+
+    name = "oracle"
+
+    def __init__(self, rooms: list[RoomViews]) -> None:
+        """Know the rooms.
+
+        Args:
+            rooms: The rooms of the episodes.
+        """
+        self._rooms = {views.room: views for views in rooms}
+
+    def begin(self, runner: EpisodeRunner, rng: np.random.Generator) -> None:
+        """Prepare for the episodes of a runner; nothing is drawn."""
+        del rng
+        self._episodes = runner.episodes
+
+    def act(self, runner: EpisodeRunner) -> NDArray[np.int64]:
+        """Choose an action for each episode, [B]: the first of those that lead one step nearer."""
+        actions = np.full(len(self._episodes), int(Action.DONE))
+        for slot in np.flatnonzero(runner.active).tolist():
+            episode = self._episodes[slot]
+            views = self._rooms[episode.room]
+            here = int(runner.local_views[slot])
+            after = views.optimal[views.graph.transitions[here, : Action.DONE], episode.target]
+            if views.optimal[here, episode.target] > 0:
+                actions[slot] = int(np.argmax(after == views.optimal[here, episode.target] - 1))
+        return actions
+
+
+class PolicyAgent:
+    """Samples from a trained policy."""
+
+    def __init__(self, name: str, policy: ActorCritic, bank: GraphBank) -> None:
+        """Take a policy.
+
+        Args:
+            name: Its method.
+            policy: The network.
+            bank: The scene graphs that it is guided by.
+        """
+        self.name = name
+        self._policy = policy
+        self._bank = bank
+
+    def begin(self, runner: EpisodeRunner, rng: np.random.Generator) -> None:
+        """Prepare for the episodes of a runner."""
+        self._state, self._rng = self._policy.initial_state(len(runner.episodes)), rng
+
+    def act(self, runner: EpisodeRunner) -> NDArray[np.int64]:
+        """Choose an action for each episode, [B]."""
+        decision = self._policy.act(runner.observe(), self._state, self._bank)
+        self._state = decision.state
+        return sample_actions(decision.logits, self._rng).numpy()

@@ -1,0 +1,105 @@
+"""Trials: the same episodes again and again, with actions drawn from another seed each time."""
+
+import statistics
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hoz_dist.evaluation.agents import Agent
+from hoz_dist.nav.episode import Episode, EpisodeResult
+from hoz_dist.nav.metrics import Metrics, long_episodes, metrics_of
+from hoz_dist.sim.episode_runner import EpisodeRunner
+from hoz_dist.sim.room_views import RoomViews
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """The results of an agent's trials."""
+
+    method: str
+    split: str
+    trials: tuple[tuple[EpisodeResult, ...], ...]
+    """Results of every episode, in the order of the list, for each trial."""
+
+    @property
+    def episodes(self) -> int:
+        """Number of episodes of a trial."""
+        return len(self.trials[0])
+
+    def of_scene(self, scene: str) -> "Evaluation":
+        """Return the part of the results that one scene has."""
+        trials = tuple(tuple(r for r in trial if r.room.scene == scene) for trial in self.trials)
+        return Evaluation(self.method, self.split, trials)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return means and standard deviations over trials, in percent, for all episodes and the long ones."""
+        return {
+            "method": self.method,
+            "split": self.split,
+            "episodes": self.episodes,
+            "trials": len(self.trials),
+            "all": _spread([metrics_of(trial) for trial in self.trials]),
+            "long": _spread([metrics_of(long_episodes(trial)) for trial in self.trials]),
+        }
+
+
+def run_trials(
+    agent: Agent,
+    rooms: Sequence[RoomViews],
+    episodes: Sequence[Episode],
+    seeds: Iterable[int],
+    *,
+    split: str,
+    progress: Callable[[int, int], None] | None = None,
+) -> Evaluation:
+    """Run an agent over all episodes, once for each seed.
+
+    Args:
+        agent: Who acts.
+        rooms: The rooms of the episodes.
+        episodes: What to run; every one counts.
+        seeds: Seed of the actions of each trial.
+        split: The split that the rooms belong to, for the report.
+        progress: Called with the number of episodes that have ended and the number of all.
+    """
+    all_seeds = list(seeds)
+    total = len(all_seeds) * len(episodes)
+    trials = []
+    for number, seed in enumerate(all_seeds):
+        runner = EpisodeRunner(rooms, episodes)
+        agent.begin(runner, np.random.default_rng(seed))
+        while runner.active.any():
+            runner.step(agent.act(runner))
+            if progress is not None:
+                progress(number * len(episodes) + int((~runner.active).sum()), total)
+        trials.append(tuple(runner.results()))
+    return Evaluation(agent.name, split, tuple(trials))
+
+
+def trace_episodes(
+    agent: Agent, rooms: Sequence[RoomViews], episodes: Sequence[Episode], seed: int
+) -> tuple[list[EpisodeResult], list[NDArray[np.int64]]]:
+    """Run an agent over episodes once, and return the results and the views that each episode visited."""
+    runner = EpisodeRunner(rooms, episodes)
+    agent.begin(runner, np.random.default_rng(seed))
+    while runner.active.any():
+        runner.step(agent.act(runner))
+    return runner.results(), runner.trajectories()
+
+
+def _spread(metrics: list[Metrics]) -> dict[str, Any]:
+    """Mean and standard deviation over trials (0 for a single one), in percent."""
+
+    def of(values: list[float]) -> dict[str, float]:
+        deviation = statistics.stdev(values) if len(values) > 1 else 0.0
+        return {"mean": round(100 * statistics.fmean(values), 2), "std": round(100 * deviation, 2)}
+
+    return {
+        "episodes": metrics[0].episodes,
+        "sr": of([m.sr for m in metrics]),
+        "spl": of([m.spl for m in metrics]),
+        "sae": of([m.sae for m in metrics]),
+    }

@@ -1,0 +1,216 @@
+"""The actor-critic network of all methods: what acts, and what a rollout's gradient is computed through.
+
+One network serves `a3c`, `object` and `hoz`; `PolicySettings` switches the layers. Acting goes step by step and decides
+which scene, zone and sub-goal to use (`act`); training goes over a whole rollout at once with those decisions given, as it
+goes with the actions given (`unroll`).
+"""
+
+from typing import NamedTuple
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+from hoz_dist.nav.actions import NO_ACTION, Action
+from hoz_dist.nav.categories import SCENES, TARGETS
+from hoz_dist.nav.observation import Observation
+from hoz_dist.policy.graph_bank import GraphBank
+from hoz_dist.policy.layers import DoneReminder, ObjectLayer, SceneLayer, ZoneLayer
+from hoz_dist.policy.navigator import Guidance, ZoneState, guide, initial_zone_state
+from hoz_dist.policy.recurrent import EpisodicLSTM
+from hoz_dist.policy.settings import PolicySettings
+from hoz_dist.policy.trunks import make_trunk
+
+MOVE_BIAS = 1.5
+"""Bias of the other actions' logits over Done's at the start.
+
+Done at once is a local optimum: it costs one step, wandering costs many. With the done reminder it is hard to leave, since
+Done's logit is 0 while the target is not seen and cannot be pushed down. So training starts where Done is rare.
+"""
+
+
+class State(NamedTuple):
+    """Recurrent state of B episodes."""
+
+    lstm: Tensor
+    """[2, layers, B, cells]."""
+    zone: ZoneState
+    """Local copy of the scene graph; empty without the zone layer."""
+
+
+class Decision(NamedTuple):
+    """What the network says at one step."""
+
+    logits: Tensor
+    """[B, 6]."""
+    value: Tensor
+    """[B]."""
+    state: State
+    """State after the step."""
+    guidance: Guidance
+    """Scene, zone and sub-goal in use, to be recorded for `ActorCritic.unroll`."""
+
+
+class Unrolled(NamedTuple):
+    """What the network says over a rollout."""
+
+    logits: Tensor
+    """[T, B, 6]."""
+    values: Tensor
+    """[T, B]."""
+    scene_logits: Tensor | None
+    """[T, B, S], or None without the scene layer."""
+
+
+class _Inputs(NamedTuple):
+    """An observation as tensors with time and batch flattened."""
+
+    features: Tensor
+    detections: Tensor
+    appearance: Tensor
+    target: Tensor
+    previous_action: Tensor
+
+    @classmethod
+    def of(cls, observation: Observation) -> "_Inputs":
+        def flat(values: Tensor) -> Tensor:
+            return values.reshape(-1, *values.shape[observation.target.ndim :])
+
+        return cls(
+            features=flat(torch.from_numpy(observation.features)),
+            detections=flat(torch.from_numpy(observation.detections)),
+            appearance=flat(torch.from_numpy(observation.appearance)),
+            target=functional.one_hot(flat(torch.from_numpy(observation.target)), len(TARGETS)).float(),
+            previous_action=flat(torch.from_numpy(observation.previous_action)),
+        )
+
+    @property
+    def confidence(self) -> Tensor:
+        """f^s, [B, N]."""
+        return self.detections[..., 4]
+
+    @property
+    def bag(self) -> Tensor:
+        """f, the bag of objects seen, [B, N]."""
+        return (self.confidence > 0).float()
+
+
+class ActorCritic(nn.Module):
+    """Policy and value function."""
+
+    def __init__(self, settings: PolicySettings, zones: int) -> None:
+        super().__init__()
+        self.settings = settings
+        self.zones = zones
+        sizes, categories = settings.sizes, len(TARGETS)
+        context = sizes.target + sizes.action
+        context += sizes.zones * settings.zone_layer + len(SCENES) * settings.scene_layer
+        self.target_embedding = nn.Linear(categories, sizes.target)
+        self.action_embedding = nn.Embedding(NO_ACTION + 1, sizes.action)
+        self.trunk = make_trunk(settings, context)
+        self.object_layer = ObjectLayer(categories, sizes.objects) if settings.object_layer else None
+        self.scene_layer = (
+            SceneLayer(self.trunk.picture_features, categories, len(SCENES)) if settings.scene_layer else None
+        )
+        self.zone_layer = ZoneLayer(categories, sizes.zones) if settings.zone_layer else None
+        self.lstm = EpisodicLSTM(self.trunk.features, sizes.lstm, sizes.lstm_layers)
+        self.actor = nn.Linear(sizes.lstm, len(Action))
+        self.critic = nn.Linear(sizes.lstm, 1)
+        self.done_reminder = DoneReminder() if settings.done_reminder else None
+        with torch.no_grad():
+            self.actor.weight.mul_(0.1)
+            self.actor.bias.fill_(MOVE_BIAS)
+            self.actor.bias[Action.DONE] = 0.0
+
+    def initial_state(self, batch: int) -> State:
+        """Return the state before any episode's first step."""
+        return State(self.lstm.initial_state(batch), initial_zone_state(batch, self.zones))
+
+    @torch.no_grad()
+    def act(self, observation: Observation, state: State, bank: GraphBank) -> Decision:
+        """Perceive one step of B episodes, and say how to go on.
+
+        Args:
+            observation: [B, ...].
+            state: State after the step before; that of an episode which begins is reset here.
+            bank: Scene graphs; not used without the zone layer.
+        """
+        inputs = _Inputs.of(observation)
+        first = torch.from_numpy(observation.first)
+        picture = self.trunk.see(inputs.features)
+        scene_logits = self._scene_logits(picture, inputs)
+        zone, guidance = state.zone, Guidance.nothing(len(first))
+        embedding = None
+        if self.zone_layer is not None:
+            zone, guidance = guide(self.zone_layer, bank, zone, inputs.bag, inputs.target, scene_logits, first)
+            embedding = self.zone_layer(zone.nodes, bank.adjacency[guidance.scene, guidance.subgoal])
+        joined = self._join(inputs, picture, scene_logits, embedding)
+        outputs, lstm = self.lstm(joined.unsqueeze(0), first.unsqueeze(0), state.lstm)
+        logits, value = self._heads(outputs.squeeze(0), inputs)
+        return Decision(logits, value, State(lstm, zone), guidance)
+
+    def unroll(self, observation: Observation, state: State, guidance: Guidance, bank: GraphBank) -> Unrolled:
+        """Run over a rollout, differentiably.
+
+        Args:
+            observation: [T, B, ...].
+            state: State before the rollout's first step.
+            guidance: What `act` decided at each step, [T, B].
+            bank: The scene graphs that `act` used.
+        """
+        steps, batch = observation.target.shape
+        inputs = _Inputs.of(observation)
+        first = torch.from_numpy(observation.first)
+        picture = self.trunk.see(inputs.features)
+        scene_logits = self._scene_logits(picture, inputs)
+        embedding = None
+        if self.zone_layer is not None:
+            nodes = self._nodes_over_time(inputs.bag.view(steps, batch, -1), state.zone, guidance, bank)
+            rows = bank.adjacency[guidance.scene.flatten(), guidance.subgoal.flatten()]
+            embedding = self.zone_layer(nodes.flatten(0, 1), rows)
+        joined = self._join(inputs, picture, scene_logits, embedding)
+        outputs, _ = self.lstm(joined.view(steps, batch, -1), first, state.lstm)
+        logits, values = self._heads(outputs.flatten(0, 1), inputs)
+        return Unrolled(
+            logits=logits.view(steps, batch, -1),
+            values=values.view(steps, batch),
+            scene_logits=None if scene_logits is None else scene_logits.view(steps, batch, -1),
+        )
+
+    def _scene_logits(self, picture: Tensor, inputs: _Inputs) -> Tensor | None:
+        if self.scene_layer is None:
+            return None
+        return self.scene_layer(self.trunk.summary(picture), inputs.confidence)  # type: ignore[no-any-return]
+
+    def _nodes_over_time(self, bags: Tensor, zone: ZoneState, guidance: Guidance, bank: GraphBank) -> Tensor:
+        """Return delta_t of every step, [T, B, K, N]; the gradient reaches lambda."""
+        assert self.zone_layer is not None
+        nodes, over_time = zone.nodes, []
+        chosen = functional.one_hot(guidance.current, self.zones).float()
+        for t in range(len(bags)):
+            fresh = guidance.fresh[t]
+            if fresh.any():
+                nodes = torch.where(fresh[:, None, None], bank.nodes[guidance.scene[t]], nodes)
+            nodes = self.zone_layer.update(nodes, bags[t], chosen[t])
+            over_time.append(nodes)
+        return torch.stack(over_time)
+
+    def _join(
+        self, inputs: _Inputs, picture: Tensor, scene_logits: Tensor | None, zone_embedding: Tensor | None
+    ) -> Tensor:
+        context = [self.target_embedding(inputs.target), self.action_embedding(inputs.previous_action)]
+        if scene_logits is not None:
+            # The label trains the scene layer, the reward does not: it would bend the classifier.
+            context.append(scene_logits.detach().softmax(dim=-1))
+        if zone_embedding is not None:
+            context.append(zone_embedding)
+        objects = None
+        if self.object_layer is not None:
+            objects = self.object_layer(inputs.detections, inputs.appearance, inputs.target)
+        return self.trunk(picture, objects, torch.cat(context, dim=1))  # type: ignore[no-any-return]
+
+    def _heads(self, outputs: Tensor, inputs: _Inputs) -> tuple[Tensor, Tensor]:
+        logits = self.actor(outputs)
+        if self.done_reminder is not None:
+            logits = self.done_reminder(logits, inputs.confidence, inputs.target)
+        return logits, self.critic(outputs).squeeze(-1)

@@ -1,0 +1,84 @@
+"""How the inputs join before the LSTM: as vectors (compact), or as maps of a 7 x 7 grid (the paper's)."""
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+from hoz_dist.policy.settings import PolicySettings
+
+
+class VectorTrunk(nn.Module):
+    """Every input is a vector; they are concatenated."""
+
+    def __init__(self, settings: PolicySettings, context: int) -> None:
+        super().__init__()
+        sizes = settings.sizes
+        self.picture = nn.Linear(settings.channels * settings.grid**2, sizes.picture)
+        self.picture_features = sizes.picture
+        self.features = sizes.picture + context
+        if settings.object_layer:
+            self.features += sizes.objects * (settings.channels + 1)
+
+    def see(self, features: Tensor) -> Tensor:
+        """Map feature grids [B, C, G, G] to picture features [B, F]."""
+        return functional.relu(self.picture(features.flatten(1)))  # type: ignore[no-any-return]
+
+    def summary(self, picture: Tensor) -> Tensor:
+        """Return what the scene layer sees of the picture, [B, F]."""
+        return picture
+
+    def forward(self, picture: Tensor, objects: Tensor | None, context: Tensor) -> Tensor:
+        """Join the inputs.
+
+        Args:
+            picture: What `see` returned.
+            objects: H_o' f^v, [B, D_o, C + 1], or None without the object layer.
+            context: All vectors, [B, X].
+
+        Returns:
+            [B, `features`].
+        """
+        parts = [picture, context] if objects is None else [picture, context, objects.flatten(1)]
+        return torch.cat(parts, dim=1)
+
+
+class GridTrunk(nn.Module):
+    """Every input is a map over the 7 x 7 grid; pointwise convolutions join them to 64 x 7 x 7 features."""
+
+    def __init__(self, settings: PolicySettings, context: int) -> None:
+        super().__init__()
+        sizes = settings.sizes
+        self.cells = settings.grid**2
+        self.picture = nn.Linear(settings.channels, sizes.picture)
+        self.picture_features = sizes.picture
+        joined = sizes.picture + context
+        if settings.object_layer:
+            self.objects = nn.Linear(settings.channels + 1, sizes.picture)
+            joined += sizes.picture
+        self.join = nn.Linear(joined, sizes.picture)
+        self.features = sizes.picture * self.cells
+
+    def see(self, features: Tensor) -> Tensor:
+        """Map feature grids [B, C, G, G] to picture features [B, G * G, F]; a pointwise convolution."""
+        return functional.relu(self.picture(features.flatten(2).transpose(1, 2)))  # type: ignore[no-any-return]
+
+    def summary(self, picture: Tensor) -> Tensor:
+        """Return what the scene layer sees of the picture, [B, F]."""
+        return picture.mean(dim=1)
+
+    def forward(self, picture: Tensor, objects: Tensor | None, context: Tensor) -> Tensor:
+        """Join the inputs; see `VectorTrunk.forward`."""
+        parts = [picture, context.unsqueeze(1).expand(-1, self.cells, -1)]
+        if objects is not None:
+            parts.append(functional.relu(self.objects(objects)))
+        return functional.relu(self.join(torch.cat(parts, dim=2))).flatten(1)
+
+
+def make_trunk(settings: PolicySettings, context: int) -> VectorTrunk | GridTrunk:
+    """Make the trunk of a preset.
+
+    Args:
+        settings: The policy's settings.
+        context: X, the sum of the sizes of all vector inputs.
+    """
+    return VectorTrunk(settings, context) if settings.sizes.trunk == "vector" else GridTrunk(settings, context)
