@@ -7,13 +7,11 @@ from numpy.typing import NDArray
 
 from hoz_dist.errors import InvalidValueError
 from hoz_dist.nav.episode import EpisodeResult
+from hoz_dist.nav.observation import Observation
 from hoz_dist.sim.episode_batch import EpisodeBatch
 from hoz_dist.sim.episodes import TRAINING_PITCHES, EpisodeSampler
-from hoz_dist.sim.observation import Observation
 from hoz_dist.sim.room_views import RoomViews
 from hoz_dist.sim.view_source import ViewSource
-
-__all__ = ["BatchEnv", "Observation", "Step"]
 
 
 class Step(NamedTuple):

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from hoz_dist.nav.actions import NO_ACTION, Action
 from hoz_dist.nav.categories import scene_index
 from hoz_dist.nav.episode import Episode, EpisodeResult, evaluation_cap
+from hoz_dist.nav.observation import Observation
 from hoz_dist.nav.reward import STEP_REWARD, SUCCESS_REWARD
-from hoz_dist.sim.observation import Observation
 from hoz_dist.sim.room_views import RoomViews
 from hoz_dist.sim.row_table import RowTable
 from hoz_dist.sim.view_source import StoredViews, ViewSource

@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from hoz_dist.errors import InvalidValueError
 from hoz_dist.nav.episode import Episode, EpisodeResult
+from hoz_dist.nav.observation import Observation
 from hoz_dist.nav.rooms import RoomId
 from hoz_dist.sim.episode_batch import EpisodeBatch, Outcome
-from hoz_dist.sim.observation import Observation
 from hoz_dist.sim.room_views import RoomViews
 from hoz_dist.sim.view_source import ViewSource
 

@@ -1,13 +1,23 @@
 """Where observations come from: stored views (a look-up), or PyBullet at every step (`hoz_dist.sim.live`)."""
 
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hoz_dist.sim.observation import Sight
 from hoz_dist.sim.room_views import RoomViews
 from hoz_dist.sim.row_table import RowTable
+
+
+class Sight(NamedTuple):
+    """What the camera and the encoder show of views; [...] stands for the shape of the view indices."""
+
+    features: NDArray[np.float32]
+    """Feature grids, [..., C, G, G]."""
+    detections: NDArray[np.float32]
+    """Box (x0, y0, x1, y1) over picture size and confidence of each category, [..., N, 5]."""
+    appearance: NDArray[np.float32]
+    """Average feature under each box, [..., N, C]."""
 
 
 class ViewSource(Protocol):
