@@ -1,0 +1,106 @@
+"""Pictures of trajectories in a room, seen from above."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+from numpy.typing import NDArray
+
+from hoz_dist.nav.categories import TARGETS
+from hoz_dist.nav.episode import SUCCESS_DISTANCE_M, EpisodeResult
+from hoz_dist.nav.pose import GRID_M
+from hoz_dist.sim.pose_graph import PoseGraph
+from hoz_dist.sim.room import Item, Room
+
+_FLOOR_ITEM_M = 0.05
+"""Items that reach no higher than this, metres, are rugs and floors and are drawn lightest."""
+
+
+class Trajectory(NamedTuple):
+    """One episode's way through a room."""
+
+    room: Room
+    graph: PoseGraph
+    views: NDArray[np.int64]
+    """Views that were visited, the start first, [actions + 1]."""
+    result: EpisodeResult
+    agent: str
+    """Who went this way."""
+
+
+def draw_trajectories(trajectories: Sequence[Trajectory], path: Path) -> None:
+    """Draw trajectories side by side and write them as a PNG file.
+
+    Args:
+        trajectories: At least one.
+        path: File to write; its folder is made if need be.
+    """
+    columns = min(4, len(trajectories))
+    rows = -(-len(trajectories) // columns)
+    figure = Figure(figsize=(4.2 * columns, 4.4 * rows), layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.subplots(rows, columns, squeeze=False).ravel()
+    for axis, trajectory in zip(axes, trajectories, strict=False):
+        _draw(axis, trajectory)
+    for axis in axes[len(trajectories) :]:
+        axis.set_axis_off()
+    path.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(path, dpi=110)
+
+
+def _draw(axis: Axes, trajectory: Trajectory) -> None:
+    room, graph, result = trajectory.room, trajectory.graph, trajectory.result
+    target = TARGETS[result.target]
+    for item in sorted(room.items, key=lambda item: item.high[2]):
+        _draw_item(axis, item, is_target=item.category == target)
+    reachable = graph.positions * GRID_M
+    axis.scatter(reachable[:, 0], reachable[:, 1], s=2, color="0.75", zorder=2)
+
+    poses = [graph.pose(int(view)) for view in trajectory.views]
+    x, z = np.array([pose.x for pose in poses]), np.array([pose.z for pose in poses])
+    axis.plot(x, z, color="tab:blue", linewidth=1.6, zorder=4)
+    yaw = np.deg2rad([pose.yaw for pose in poses])
+    axis.quiver(x, z, np.sin(yaw), np.cos(yaw), color="tab:blue", scale=28, width=0.006, zorder=5)
+    axis.plot(x[0], z[0], "o", color="black", markersize=7, zorder=6)
+    axis.plot(x[-1], z[-1], "*", color="tab:green" if result.success else "tab:red", markersize=15, zorder=7)
+    ending = "found" if result.success else ("wrong Done" if result.said_done else "time ran out")
+    axis.set_title(
+        f"{trajectory.agent}: {target} in {room.room}\n{ending} after {result.actions} actions (optimal {result.optimal})",
+        fontsize=9,
+    )
+    axis.set_xlim(-0.1, room.width + 0.1)
+    axis.set_ylim(-0.1, room.depth + 0.1)
+    axis.set_aspect("equal")
+    axis.set_xlabel("x, m", fontsize=8)
+    axis.set_ylabel("z, m", fontsize=8)
+    axis.tick_params(labelsize=7)
+
+
+def _draw_item(axis: Axes, item: Item, *, is_target: bool) -> None:
+    (x0, z0, _), (x1, z1, height) = item.low, item.high
+    if is_target:
+        centre = ((x0 + x1) / 2, (z0 + z1) / 2)
+        axis.add_patch(Rectangle((x0, z0), x1 - x0, z1 - z0, facecolor="tab:orange", edgecolor="black", zorder=3))
+        axis.plot(*centre, "x", color="black", markersize=6, zorder=3)
+        axis.add_patch(
+            Rectangle(
+                (x0 - SUCCESS_DISTANCE_M, z0 - SUCCESS_DISTANCE_M),
+                x1 - x0 + 2 * SUCCESS_DISTANCE_M,
+                z1 - z0 + 2 * SUCCESS_DISTANCE_M,
+                fill=False,
+                linestyle=":",
+                edgecolor="tab:orange",
+                zorder=3,
+            )
+        )
+        return
+    for part in item.parts:
+        (px, pz, _), (sx, sz, _) = part.low, part.size
+        shade = 0.97 if height <= _FLOOR_ITEM_M else 0.88
+        colour = tuple(shade * 0.6 + channel * 0.4 for channel in part.colour)
+        axis.add_patch(Rectangle((px, pz), sx, sz, facecolor=colour, edgecolor="0.6", linewidth=0.4, zorder=1))
