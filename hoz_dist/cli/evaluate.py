@@ -1,0 +1,72 @@
+"""`hoz-dist evaluate`: measure a checkpoint on rooms that it was not trained in."""
+
+import json
+from pathlib import Path
+
+import click
+
+from hoz_dist.nav.categories import SCENES
+
+
+@click.command("evaluate")
+@click.argument("checkpoint", type=click.Path(path_type=Path))
+@click.option("--split", type=click.Choice(["val", "test"]), default="val", show_default=True, help="Rooms to use.")
+@click.option(
+    "--trials", type=click.IntRange(1, 100), default=5, show_default=True, help="Trials; each draws its own actions."
+)
+@click.option(
+    "--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of the first trial; the next adds 1."
+)
+@click.option(
+    "--episodes", type=click.IntRange(1, 100_000), default=400, show_default=True, help="Episodes in each scene."
+)
+@click.option(
+    "--scene",
+    "scenes",
+    multiple=True,
+    help=f"Scene to evaluate in: {', '.join(SCENES)}; may be repeated.  [default: those that it was trained in]",
+)
+@click.option(
+    "--weights", type=click.Path(path_type=Path), help="Weights of the resnet18 encoder.  [default: none needed]"
+)
+@click.option(
+    "--cache",
+    type=click.Path(path_type=Path),
+    help="Folder of the view store.  [default: $HOZ_CACHE or the user's cache folder]",
+)
+@click.option("--json", "as_json", is_flag=True, help="Print JSON, in percent, instead of a table.")
+def evaluate_command(
+    checkpoint: Path,
+    split: str,
+    trials: int,
+    seed: int,
+    episodes: int,
+    scenes: tuple[str, ...],
+    weights: Path | None,
+    cache: Path | None,
+    *,
+    as_json: bool,
+) -> None:
+    """Measure CHECKPOINT, a checkpoint file or a run folder, against Random and Oracle.
+
+    All agents run the same fixed list of episodes, and every one of them counts. One seed gives the same numbers again.
+    """
+    from rich.console import Console
+
+    from hoz_dist.cli.measure import measure
+    from hoz_dist.evaluation.table import comparison_table
+    from learner.checkpoint import load_checkpoint
+
+    comparison = measure(
+        load_checkpoint(checkpoint),
+        split="test" if split == "test" else "val",
+        seeds=range(seed, seed + trials),
+        episodes=episodes,
+        scenes=scenes,
+        weights=weights,
+        cache=cache,
+    )
+    if as_json:
+        click.echo(json.dumps(comparison.to_json(), indent=2))
+    else:
+        Console().print(comparison_table(comparison))

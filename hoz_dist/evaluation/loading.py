@@ -1,0 +1,84 @@
+"""From a run's configuration, parameters and graphs to an agent; from a split to rooms."""
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hoz_dist.config import RunConfig
+from hoz_dist.errors import DamagedFileError, InvalidValueError, NotFoundError
+from hoz_dist.evaluation.agents import PolicyAgent
+from hoz_dist.graph.scene_graph import SceneGraph
+from hoz_dist.nav.encoder import VisualEncoder
+from hoz_dist.nav.rooms import Split, rooms_of
+from hoz_dist.policy.encoders import load_encoder
+from hoz_dist.policy.graph_bank import GraphBank
+from hoz_dist.policy.parameters import FlatParameters, make_policy
+from hoz_dist.sim.room_views import RoomViews
+from hoz_dist.sim.view_store import ViewStore
+
+
+def load_agent(
+    config: RunConfig, parameters: NDArray[np.float32], graphs: Mapping[str, SceneGraph]
+) -> PolicyAgent:
+    """Make the agent that a checkpoint holds.
+
+    Args:
+        config: Configuration of the run.
+        parameters: [P].
+        graphs: Scene graphs, by scene.
+
+    Raises:
+        DamagedFileError: The parameters are not those of the configuration's network.
+        NotFoundError: The method is guided by graphs and there is none.
+    """
+    policy = make_policy(config)
+    try:
+        FlatParameters(policy).load(parameters)
+    except ValueError as error:
+        message = f"The checkpoint's parameters do not fit its configuration ({error}); use another checkpoint."
+        raise DamagedFileError(message) from error
+    if config.policy.zone_layer and not graphs:
+        message = "The checkpoint holds no scene graph, so its agent has nothing to be guided by; train longer."
+        raise NotFoundError(message)
+    return PolicyAgent(config.method, policy.eval(), GraphBank.of(graphs, config.zones, config.edge_cost))
+
+
+def matching_encoder(config: RunConfig, weights: Path | None) -> VisualEncoder:
+    """Load the visual encoder that a run was trained with.
+
+    Raises:
+        InvalidValueError: The weights are not those of the run.
+    """
+    encoder = load_encoder(config.encoder, weights)
+    if encoder.key != config.encoder_key:
+        message = (
+            f"The run was trained with encoder {config.encoder_key}, not {encoder.key}; give the same file to --weights."
+        )
+        raise InvalidValueError(message)
+    return encoder
+
+
+def open_rooms(
+    store: ViewStore,
+    encoder: VisualEncoder,
+    scenes: Sequence[str],
+    split: Split,
+    progress: Callable[[str], None] | None = None,
+) -> list[RoomViews]:
+    """Open all rooms of some scenes in a split, rendering those that are not in the store yet.
+
+    Args:
+        store: The view store.
+        encoder: The visual encoder.
+        scenes: Scenes.
+        split: Split.
+        progress: Called with the name of each room that is open.
+    """
+    rooms = []
+    for room in (room for scene in scenes for room in rooms_of(scene, split)):
+        rooms.append(store.open(room, encoder))
+        if progress is not None:
+            progress(str(room))
+    return rooms
