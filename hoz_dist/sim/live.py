@@ -1,0 +1,133 @@
+"""Observations rendered by PyBullet at every step: the check that stored views tell the truth."""
+
+from collections import OrderedDict
+from collections.abc import Callable
+from types import TracebackType
+from typing import Final, NamedTuple, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hoz_dist.nav.encoder import VisualEncoder
+from hoz_dist.nav.rooms import RoomId
+from hoz_dist.sim.appearance import appearance
+from hoz_dist.sim.camera import Camera
+from hoz_dist.sim.catalogue import load_room
+from hoz_dist.sim.detections import Detector
+from hoz_dist.sim.pose_graph import PoseGraph
+from hoz_dist.sim.room import Room
+from hoz_dist.sim.room_views import RoomViews
+from hoz_dist.sim.view_source import Sight
+from hoz_dist.sim.world import World
+
+REMEMBERED_VIEWS: Final = 8192
+"""How many of the latest views `recall` can give without rendering: a rollout of 64 steps of 128 episodes."""
+
+
+class _LiveRoom(NamedTuple):
+    """One room of the source, in its own PyBullet client."""
+
+    first_view: int
+    graph: PoseGraph
+    camera: Camera
+    detector: Detector
+
+
+class _Seen(NamedTuple):
+    """What one view showed when it was last looked at."""
+
+    features: NDArray[np.float16]
+    detections: NDArray[np.float32]
+    appearance: NDArray[np.float16]
+    success: NDArray[np.bool_]
+
+
+class LiveViews:
+    """A `ViewSource` that renders, detects and encodes on every look; a context manager that owns its PyBullet worlds.
+
+    Only legal moves, L* and the choice of starts come from the `RoomViews` that are added.
+    """
+
+    def __init__(self, encoder: VisualEncoder, picture_size: int, rooms: Callable[[RoomId], Room] = load_room) -> None:
+        """Make a source without rooms.
+
+        Args:
+            encoder: Makes the features.
+            picture_size: S, side of the square pictures in pixels.
+            rooms: Gives the content of a room; the catalogue by default.
+        """
+        self._encoder = encoder
+        self._size = picture_size
+        self._load_room = rooms
+        self._rooms: list[_LiveRoom] = []
+        self._views = 0
+        self._seen: OrderedDict[int, _Seen] = OrderedDict()
+
+    def __enter__(self) -> Self:
+        """Return the source itself."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """End the PyBullet worlds."""
+        self.close()
+
+    def close(self) -> None:
+        """End the PyBullet worlds; closing twice does nothing."""
+        for room in self._rooms:
+            room.camera.world.close()
+        self._rooms.clear()
+
+    def add_room(self, views: RoomViews) -> None:
+        """Append a room and load it into a world of its own."""
+        content = self._load_room(views.room)
+        camera = Camera(World(content), self._size)
+        self._rooms.append(_LiveRoom(self._views, views.graph, camera, Detector(content)))
+        self._views += views.graph.views
+
+    def look(self, views: NDArray[np.int64]) -> Sight:
+        """Render views [...]."""
+        for view in views.ravel().tolist():
+            self._render(view)
+        while len(self._seen) > max(REMEMBERED_VIEWS, views.size):
+            self._seen.popitem(last=False)
+        return self._sight(views)
+
+    def recall(self, views: NDArray[np.int64]) -> Sight:
+        """Show views [...] again as they were last rendered; those that are forgotten are rendered again."""
+        for view in np.unique(views).tolist():
+            if view not in self._seen:
+                self._render(view)
+        return self._sight(views)
+
+    def succeeds(self, views: NDArray[np.int64], targets: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Tell from the last pictures of views [M] whether Done succeeds with targets [M]."""
+        for view in views.tolist():
+            if view not in self._seen:
+                self._render(view)
+        pairs = zip(views.tolist(), targets.tolist(), strict=True)
+        return np.array([self._seen[view].success[target] for view, target in pairs], dtype=np.bool_)
+
+    def _render(self, view: int) -> None:
+        """Render one view and remember what it shows, as the latest."""
+        room = next(room for room in reversed(self._rooms) if room.first_view <= view)
+        pose = room.graph.pose(view - room.first_view)
+        frame = room.camera.render(pose)
+        # Stored depths are half precision; the encoder gets the same here.
+        depth = frame.depth[None].astype(np.float16).astype(np.float32)
+        features = self._encoder.encode(frame.rgb[None], depth)
+        found = room.detector.detect(frame.segmentation[None], np.array([[pose.x, pose.z]]))
+        looks = appearance(features, found.detections)
+        self._seen[view] = _Seen(features[0], found.detections[0], looks[0], found.success[0])
+        self._seen.move_to_end(view)
+
+    def _sight(self, views: NDArray[np.int64]) -> Sight:
+        """Gather what was seen at views [...]."""
+        seen = [self._seen[view] for view in views.ravel().tolist()]
+
+        def gather(field: int) -> NDArray[np.float32]:
+            rows = np.stack([entry[field] for entry in seen]).astype(np.float32)
+            return rows.reshape(*views.shape, *rows.shape[1:])
+
+        return Sight(gather(0), gather(1), gather(2))

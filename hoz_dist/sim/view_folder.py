@@ -1,0 +1,202 @@
+"""The files of one room in the view cache: pictures in chunks with checksums, and arrays derived from them.
+
+    header.json               what the folder holds, with the digests of the pose graph's files; written with the folder
+    positions.npy, transitions.npy
+    rgb.npy                   u8 [V, S, S, 3]
+    depth.npy                 f16 [V, S, S]
+    segmentation.npy          u8 [V, S, S]
+    checksums.npy             u64 [P], of the 16 views of a position; 0: not rendered yet
+    <encoder>.json            digests of the arrays derived with that encoder; written after them
+    <encoder>.<array>.npy
+
+Nothing here is trusted: what does not match its checksum counts as missing and is made again.
+"""
+
+import json
+import shutil
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final, NamedTuple, Self
+
+import numpy as np
+import xxhash
+from numpy.typing import NDArray
+
+from hoz_dist.errors import DamagedFileError
+from hoz_dist.sim.pose_graph import VIEWS_PER_POSITION, PoseGraph
+
+_HEADER: Final = "header.json"
+_CHECKSUMS: Final = "checksums.npy"
+_GRAPH_FILES: Final = ("positions", "transitions")
+_DTYPES: Final = {"rgb": np.uint8, "depth": np.float16, "segmentation": np.uint8}
+_Array = NDArray[Any]
+_Map = np.memmap[Any, Any]
+
+
+class Frames(NamedTuple):
+    """Pictures of M views."""
+
+    rgb: NDArray[np.uint8]
+    """Colours, [M, S, S, 3]."""
+    depth: NDArray[np.float16]
+    """Distance along the viewing axis, metres, [M, S, S]."""
+    segmentation: NDArray[np.uint8]
+    """Index of the room's item plus 1, 0 where there is nothing, [M, S, S]."""
+
+
+class ViewFolder:
+    """One room's folder, opened; reading needs no write access."""
+
+    def __init__(self, path: Path, graph: PoseGraph, frames: Mapping[str, _Map], checksums: _Map) -> None:
+        """Use `open` or `create`."""
+        self.path = path
+        self.graph = graph
+        self._frames = frames
+        self._checksum_map = checksums
+        self._checksums = np.array(checksums)
+
+    @classmethod
+    def open(cls, path: Path, size: int) -> Self:
+        """Open a folder.
+
+        Args:
+            path: The folder.
+            size: S, side of its pictures.
+
+        Raises:
+            DamagedFileError: The folder is not there, or its header, pose graph or the length of a file is wrong.
+        """
+        try:
+            digests = json.loads((path / _HEADER).read_text())
+            positions, transitions = (np.array(_load(path / f"{name}.npy")) for name in _GRAPH_FILES)
+            frames = {name: _load(path / f"{name}.npy") for name in Frames._fields}
+            checksums = _load(path / _CHECKSUMS)
+        except (OSError, ValueError) as error:
+            raise _damaged(path) from error
+        graph = PoseGraph(positions, transitions)
+        whole = digests == _graph_digests(graph) and checksums.shape == (len(positions),)
+        if not whole or [array.shape[1:] for array in frames.values()] != list(_picture_shapes(size).values()):
+            raise _damaged(path)
+        if any(len(array) != graph.views for array in frames.values()):
+            raise _damaged(path)
+        return cls(path, graph, frames, checksums)
+
+    @classmethod
+    def create(cls, path: Path, graph: PoseGraph, size: int) -> Self:
+        """Make a folder without pictures in place of what is there; the caller holds the room's lock.
+
+        It is filled under a temporary name and renamed, so that no reader meets half a folder.
+
+        Raises:
+            OSError: The cache cannot be written.
+        """
+        building = path.with_name(f".{path.name}.new")
+        shutil.rmtree(building, ignore_errors=True)
+        building.mkdir()
+        for name in _GRAPH_FILES:
+            np.save(building / f"{name}.npy", getattr(graph, name))
+        np.save(building / _CHECKSUMS, np.zeros(len(graph.positions), dtype=np.uint64))
+        for name, shape in _picture_shapes(size).items():
+            # Sparse: pictures take disk space as they are rendered.
+            np.lib.format.open_memmap(building / f"{name}.npy", "w+", _DTYPES[name], (graph.views, *shape))
+        (building / _HEADER).write_text(json.dumps(_graph_digests(graph)))
+        if path.exists():
+            discarded = path.with_name(f".{path.name}.old")
+            shutil.rmtree(discarded, ignore_errors=True)
+            path.rename(discarded)
+            shutil.rmtree(discarded, ignore_errors=True)
+        building.rename(path)
+        return cls.open(path, size)
+
+    def read(self, position: int) -> Frames | None:
+        """Return the pictures of a position's 16 views, or None when they are not there or damaged."""
+        start = position * VIEWS_PER_POSITION
+        rows = slice(start, start + VIEWS_PER_POSITION)
+        frames = Frames(**{name: np.asarray(array[rows]) for name, array in self._frames.items()})
+        return frames if _frames_digest(frames) == self._checksums[position] else None
+
+    def write(self, position: int, frames: Frames) -> None:
+        """Store the pictures of a position's 16 views; the caller holds the room's lock.
+
+        Written with write(2) rather than through the map: a full disk is then an error, not a SIGBUS.
+
+        Raises:
+            OSError: The cache cannot be written.
+        """
+        for name, new in frames._asdict().items():
+            _overwrite(self._frames[name], position * new.nbytes, new)
+        self._checksums[position] = _frames_digest(frames)
+        checksum = self._checksums[position : position + 1]
+        _overwrite(self._checksum_map, position * checksum.nbytes, checksum)
+
+    def load_derived(self, name: str) -> dict[str, _Array] | None:
+        """Return the arrays derived under a name, memory-mapped, or None when they are not there or damaged."""
+        try:
+            digests = json.loads((self.path / f"{name}.json").read_text())
+            arrays = {array_name: _load(self.path / f"{name}.{array_name}.npy") for array_name in digests}
+        except (OSError, ValueError):
+            return None
+        whole = all(_digest(array) == digests[array_name] for array_name, array in arrays.items())
+        return dict(arrays) if whole else None
+
+    def save_derived(self, name: str, arrays: Mapping[str, _Array]) -> None:
+        """Store arrays derived from all pictures under a name.
+
+        Each file is written under a temporary name and renamed, the digests last.
+
+        Raises:
+            OSError: The cache cannot be written.
+        """
+        for array_name, array in arrays.items():
+            path = self.path / f"{name}.{array_name}.npy"
+            temporary = path.with_suffix(".tmp")
+            with temporary.open("wb") as file:
+                np.save(file, array)
+            temporary.replace(path)
+        temporary = self.path / f"{name}.tmp"
+        temporary.write_text(json.dumps({array_name: _digest(array) for array_name, array in arrays.items()}))
+        temporary.replace(self.path / f"{name}.json")
+
+
+def _damaged(path: Path) -> DamagedFileError:
+    return DamagedFileError(f"View folder {path} is missing or damaged.")
+
+
+def _picture_shapes(size: int) -> dict[str, tuple[int, ...]]:
+    return {"rgb": (size, size, 3), "depth": (size, size), "segmentation": (size, size)}
+
+
+def _load(path: Path) -> _Map:
+    """Map an array's file.
+
+    Raises:
+        OSError: The file cannot be read.
+        ValueError: It is not an array, or too short.
+    """
+    try:
+        return np.lib.format.open_memmap(path, "r")
+    except EOFError as error:
+        raise ValueError(path) from error
+
+
+def _overwrite(array: _Map, offset: int, rows: _Array) -> None:
+    """Write rows into an array's file, ``offset`` bytes behind its first row."""
+    with Path(str(array.filename)).open("r+b") as file:
+        file.seek(array.offset + offset)
+        file.write(np.ascontiguousarray(rows).data)
+
+
+def _digest(array: _Array) -> str:
+    return f"{array.dtype.str}{list(array.shape)} {xxhash.xxh3_64_hexdigest(np.ascontiguousarray(array).data)}"
+
+
+def _graph_digests(graph: PoseGraph) -> dict[str, str]:
+    return {name: _digest(getattr(graph, name)) for name in _GRAPH_FILES}
+
+
+def _frames_digest(frames: Frames) -> int:
+    """Return the checksum of a position's pictures, never 0."""
+    hasher = xxhash.xxh3_64()
+    for array in frames:
+        hasher.update(np.ascontiguousarray(array).data)
+    return hasher.intdigest() or 1

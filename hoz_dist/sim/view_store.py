@@ -1,0 +1,229 @@
+"""The view cache: every room's pictures, rendered once, and what follows from them.
+
+A picture takes about 1.4 ms to render and an index look-up takes a microsecond, so a room is rendered once per machine
+and read by all processes through the page cache. A room's folder is named by everything that shapes its pictures; a
+change of any of it is another folder.
+
+Writers of one room take turns by a lock file (`flock`: the system frees it when its holder dies), because rendering the
+same pictures twice is what would cost. Readers take no lock: a position counts once its checksum is right.
+"""
+
+import hashlib
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import cache
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, Final
+
+import filelock
+import numpy as np
+import platformdirs
+from numpy.typing import NDArray
+
+from hoz_dist.errors import DamagedFileError, InvalidValueError
+from hoz_dist.nav.encoder import VisualEncoder
+from hoz_dist.nav.pose import GRID_M
+from hoz_dist.nav.rooms import RoomId
+from hoz_dist.sim.appearance import appearance
+from hoz_dist.sim.catalogue import load_room
+from hoz_dist.sim.detections import Detector
+from hoz_dist.sim.painter import Painter
+from hoz_dist.sim.pose_graph import VIEWS_PER_POSITION, PoseGraph
+from hoz_dist.sim.room import Room
+from hoz_dist.sim.room_views import RoomViews
+from hoz_dist.sim.view_folder import Frames, ViewFolder
+
+FORMAT_VERSION: Final = 1
+"""Raised when the files of a room's folder change their meaning."""
+DEFAULT_PICTURE_SIZE: Final = 84
+Progress = Callable[[int, int], None]
+"""Called with the number of views done and the number of all views."""
+
+_PICTURE_SOURCES: Final = ("../nav/pose.py", "world.py", "camera.py", "pose_graph.py")
+_DERIVED_SOURCES: Final = ("../nav/episode.py", "../nav/categories.py", "detections.py", "appearance.py")
+
+
+def default_cache() -> Path:
+    """Return the cache folder: ``HOZ_CACHE`` if it is set, else the user's cache folder of this system."""
+    return Path(os.environ.get("HOZ_CACHE") or platformdirs.user_cache_dir("hoz-dist"))
+
+
+class ViewStore:
+    """Opens rooms from the view cache and renders what is missing there."""
+
+    def __init__(
+        self,
+        cache: Path | None = None,
+        picture_size: int = DEFAULT_PICTURE_SIZE,
+        rooms: Callable[[RoomId], Room] = load_room,
+    ) -> None:
+        """Use a cache folder, which is made when something is first stored in it.
+
+        Args:
+            cache: The folder; `default_cache` if None.
+            picture_size: S, side of the square pictures in pixels.
+            rooms: Gives the content of a room; the catalogue by default.
+        """
+        self._load_room = rooms
+        self._cache = default_cache() if cache is None else cache
+        self._size = picture_size
+
+    def open(self, room: RoomId, encoder: VisualEncoder, progress: Progress | None = None) -> RoomViews:
+        """Return a room's views as an encoder sees them, rendering and encoding what the cache lacks.
+
+        Args:
+            room: The room.
+            encoder: Makes the features.
+            progress: Told how far rendering is; not called when nothing is missing.
+
+        Raises:
+            InvalidValueError: Something is missing and the cache cannot be written.
+        """
+        content = self._load_room(room)
+        path, name = self._path(content), _derived_name(encoder)
+        try:
+            folder = ViewFolder.open(path, self._size)
+            arrays = folder.load_derived(name)
+        except DamagedFileError:
+            arrays = None
+        if arrays is None:
+            with self._writing(path), Painter(content, self._size) as painter:
+                folder = self._open_or_create(path, painter)
+                # Another process may have been through this while we waited for the lock.
+                arrays = folder.load_derived(name)
+                if arrays is None:
+                    folder.save_derived(name, _derive(folder, painter, content, encoder, progress))
+                    arrays = folder.load_derived(name)
+        if arrays is None:
+            raise _unwritable(self._cache, "what was written could not be read back")
+        targets = tuple(np.flatnonzero(arrays["success"].any(axis=0)).tolist())
+        return RoomViews(room=room, digest=content.digest, graph=folder.graph, targets=targets, **arrays)
+
+    def frames(self, room: RoomId, views: NDArray[np.integer] | None = None) -> Frames:
+        """Return pictures, rendering those positions that the cache lacks.
+
+        Args:
+            room: The room.
+            views: Which views, [M]; all if None.
+
+        Raises:
+            InvalidValueError: Something is missing and the cache cannot be written.
+        """
+        folder, content = self._folder(room)
+        chosen = np.arange(folder.graph.views) if views is None else np.asarray(views)
+        position_of, row = np.divmod(chosen, VIEWS_PER_POSITION)
+        positions, chunk_of = np.unique(position_of, return_inverse=True)
+        chunks = [folder.read(position) for position in positions.tolist()]
+        if None in chunks:
+            with self._writing(folder.path), Painter(content, self._size) as painter:
+                chunks = [_chunk(folder, painter, position) for position in positions.tolist()]
+        frames = [chunk for chunk in chunks if chunk is not None]
+        return Frames(
+            *(
+                np.stack([frames[chunk][field][at] for chunk, at in zip(chunk_of.tolist(), row.tolist(), strict=True)])
+                for field in range(len(Frames._fields))
+            )
+        )
+
+    def graph(self, room: RoomId) -> PoseGraph:
+        """Return a room's pose graph.
+
+        Raises:
+            InvalidValueError: The cache lacks it and cannot be written.
+        """
+        return self._folder(room)[0].graph
+
+    def _folder(self, room: RoomId) -> tuple[ViewFolder, Room]:
+        """Open a room's folder, or make it."""
+        content = self._load_room(room)
+        path = self._path(content)
+        try:
+            return ViewFolder.open(path, self._size), content
+        except DamagedFileError:
+            with self._writing(path), Painter(content, self._size) as painter:
+                return self._open_or_create(path, painter), content
+
+    def _open_or_create(self, path: Path, painter: Painter) -> ViewFolder:
+        """Open a room's folder, or make it; the caller holds the lock."""
+        try:
+            return ViewFolder.open(path, self._size)
+        except DamagedFileError:
+            return ViewFolder.create(path, painter.pose_graph(), self._size)
+
+    def _path(self, room: Room) -> Path:
+        """Return the folder for a room's pictures: its name holds the digest of all that shapes them."""
+        parts = (FORMAT_VERSION, room.digest, self._size, version("pybullet"), _sources_digest(_PICTURE_SOURCES))
+        return self._cache / f"{room.room.scene}-{room.room.number}-{_short_digest(*parts)}"
+
+    @contextmanager
+    def _writing(self, path: Path) -> Iterator[None]:
+        """Hold the lock of a room's folder.
+
+        Raises:
+            InvalidValueError: The cache cannot be written.
+        """
+        try:
+            self._cache.mkdir(parents=True, exist_ok=True)
+            with filelock.FileLock(self._cache / f".{path.name}.lock"):
+                yield
+        except OSError as error:
+            raise _unwritable(self._cache, error.strerror or str(error)) from error
+
+
+def _chunk(folder: ViewFolder, painter: Painter, position: int) -> Frames:
+    """Return the pictures of a position, rendering and storing them if they are missing; the caller holds the lock."""
+    stored = folder.read(position)
+    if stored is not None:
+        return stored
+    frames = painter.paint(folder.graph, position)
+    folder.write(position, frames)
+    return frames
+
+
+def _derive(
+    folder: ViewFolder, painter: Painter, room: Room, encoder: VisualEncoder, progress: Progress | None
+) -> dict[str, NDArray[Any]]:
+    """Compute the arrays of `RoomViews` from all pictures of a room, position by position."""
+    graph, detector = folder.graph, Detector(room)
+    pieces: dict[str, list[NDArray[Any]]] = {"features": [], "detections": [], "appearance": [], "success": []}
+    for position, cell in enumerate(graph.positions):
+        frames = _chunk(folder, painter, position)
+        features = encoder.encode(frames.rgb, frames.depth.astype(np.float32))
+        found = detector.detect(frames.segmentation, np.tile(cell * GRID_M, (VIEWS_PER_POSITION, 1)))
+        pieces["features"].append(features)
+        pieces["detections"].append(found.detections)
+        pieces["appearance"].append(appearance(features, found.detections))
+        pieces["success"].append(found.success)
+        if progress is not None:
+            progress((position + 1) * VIEWS_PER_POSITION, graph.views)
+    arrays = {name: np.concatenate(chunks) for name, chunks in pieces.items()}
+    arrays["optimal"] = np.stack([graph.distances_to(goal) for goal in arrays["success"].T], axis=1)
+    return arrays
+
+
+def _derived_name(encoder: VisualEncoder) -> str:
+    """Return the name of what is derived with an encoder: its key made fit for a file, and a digest."""
+    readable = "".join(letter if letter.isalnum() else "-" for letter in encoder.key)[:32]
+    return f"{readable}-{_short_digest(encoder.key, _sources_digest(_DERIVED_SOURCES))}"
+
+
+def _short_digest(*parts: object) -> str:
+    return hashlib.blake2b("\n".join(map(str, parts)).encode(), digest_size=8).hexdigest()
+
+
+@cache
+def _sources_digest(names: tuple[str, ...]) -> str:
+    """Return a digest of modules' source texts.
+
+    So no constant or line that shapes the result can change without changing the key; a changed comment costs a
+    needless rendering, a forgotten version number would cost wrong results.
+    """
+    here = Path(__file__).parent
+    return _short_digest(*((here / name).read_text() for name in names))
+
+
+def _unwritable(cache: Path, reason: str) -> InvalidValueError:
+    message = f"The view cache {cache} cannot be written ({reason}); set HOZ_CACHE to a folder that can be."
+    return InvalidValueError(message)
