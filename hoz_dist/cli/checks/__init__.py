@@ -1,0 +1,1 @@
+"""What `hoz-dist doctor` checks."""

@@ -1,0 +1,31 @@
+"""Options that several commands share, and how results are printed."""
+
+import json
+from pathlib import Path
+from typing import Any, Final
+
+import click
+
+DEFAULT_PICTURE_SIZE: Final = 84
+"""Side of the camera's pictures, pixels; the same as a run's by default, so that the view cache is shared."""
+
+cache_option = click.option(
+    "--cache",
+    type=click.Path(file_okay=False, path_type=Path),
+    help="Folder that keeps rendered views; else HOZ_CACHE, else the user's cache folder.",
+)
+
+picture_size_option = click.option(
+    "--picture-size",
+    type=click.IntRange(16, 512),
+    default=DEFAULT_PICTURE_SIZE,
+    show_default=True,
+    help="Side of the camera's square pictures, pixels.",
+)
+
+json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON for scripts.")
+
+
+def echo_json(value: Any) -> None:
+    """Print a value as JSON on standard output."""
+    click.echo(json.dumps(value, indent=2))
