@@ -1,0 +1,51 @@
+import json
+from pathlib import Path
+
+import matplotlib.image
+import pytest
+
+from hoz_dist.cli.main import run
+from hoz_dist.nav.categories import SCENE_TARGETS
+
+pytestmark = pytest.mark.integration
+
+
+def test_show_says_what_is_in_a_room(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["scenes", "show", "bathroom/1", "--json"]) == 0
+    facts = json.loads(capsys.readouterr().out)
+    assert facts["room"] == "bathroom/1"
+    assert facts["split"] == "train"
+    assert facts["views"] == facts["positions"] * 16
+    assert facts["targets"]
+    assert set(facts["targets"]) <= set(SCENE_TARGETS["bathroom"])
+    assert set(facts["targets"]) <= set(facts["items"])
+
+    assert run(["scenes", "show", "bathroom/1"]) == 0
+    text = capsys.readouterr().out
+    assert text.startswith(f"bathroom/1 (train): {facts['width']:.2f} m x {facts['depth']:.2f} m\n")
+    assert facts["digest"] in text
+
+
+def test_render_fills_the_cache_and_draws_a_contact_sheet(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    cache, sheet = tmp_path / "views", tmp_path / "sheet.png"
+    command = ["scenes", "render", "bathroom/1", "bathroom/21", "--picture-size", "24", "--cache", str(cache)]
+    assert run([*command, "--jobs", "2", "--output", str(sheet)]) == 0
+    first = capsys.readouterr()
+    assert f"The cache {cache} holds all" in first.out
+    assert "views of 2 rooms." in first.out
+    assert "100%" in first.err
+    assert matplotlib.image.imread(sheet).shape[:2] == (2 * 24, 8 * 24)
+
+    # What is there is kept: nothing is written any more.
+    before = {file: file.stat().st_mtime_ns for file in cache.rglob("*.npy")}
+    assert run(command) == 0
+    assert {file: file.stat().st_mtime_ns for file in cache.rglob("*.npy")} == before
+
+
+def test_render_says_in_one_sentence_that_the_cache_cannot_be_written(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "file").write_text("not a folder")
+    command = ["scenes", "render", "bathroom/1", "--picture-size", "24", "--cache", str(tmp_path / "file" / "views")]
+    assert run(command) == 2
+    assert "cannot be written" in capsys.readouterr().err.splitlines()[-1]
