@@ -40,7 +40,6 @@ class RunConfig:
     discount: float = 0.99
     gae_lambda: float = 0.95
     entropy_weight: float = 0.02
-    """Weight of the entropy bonus at the start; falls with the learning rate to a tenth of it."""
     value_weight: float = 0.5
     scene_weight: float = 0.1
     """Weight of the scene layer's cross-entropy."""

@@ -48,12 +48,8 @@ class Collector:
         self.bank = GraphBank(config.zones, config.edge_cost)
         self._state: State = self._policy.initial_state(config.batch)
 
-    def roll_out(self, progress: float) -> Update:
-        """Run T steps in every episode, then go back over them once.
-
-        Args:
-            progress: Share of the run's budget that is used up, [0, 1]; the entropy bonus falls with it.
-        """
+    def roll_out(self) -> Update:
+        """Run T steps in every episode, then go back over them once."""
         config, start = self._config, self._state
         views, observed, guidances, values, steps, actions = [], [], [], [], [], []
         finished: list[EpisodeResult] = []
@@ -79,7 +75,7 @@ class Collector:
             values=torch.stack(values),
             bootstrap=decision.value,
         )
-        loss = self._differentiate(rollout, views, observed, guidances, start, progress)
+        loss = self._differentiate(rollout, views, observed, guidances, start)
         return Update(self.parameters.gradients.numpy(), rollout.frames, loss, finished)
 
     def _decide(self) -> Decision:
@@ -93,7 +89,6 @@ class Collector:
         observed: list[Observation],
         guidances: list[Guidance],
         start: State,
-        progress: float,
     ) -> Loss:
         config = self._config
         observation = self._env.gather(
@@ -106,7 +101,7 @@ class Collector:
             discount=config.discount,
             gae_lambda=config.gae_lambda,
             value=config.value_weight,
-            entropy=config.entropy_weight * (1.0 - 0.9 * progress),
+            entropy=config.entropy_weight,
             scene=config.scene_weight,
         )
         scenes = torch.from_numpy(observation.scene)

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import click
 
+from hoz_dist.cli.options import cache_option
 from hoz_dist.nav.categories import SCENES
 
 
@@ -29,11 +30,7 @@ from hoz_dist.nav.categories import SCENES
 @click.option(
     "--weights", type=click.Path(path_type=Path), help="Weights of the resnet18 encoder.  [default: none needed]"
 )
-@click.option(
-    "--cache",
-    type=click.Path(path_type=Path),
-    help="Folder of the view store.  [default: $HOZ_CACHE or the user's cache folder]",
-)
+@cache_option
 @click.option("--json", "as_json", is_flag=True, help="Print JSON, in percent, instead of a table.")
 def evaluate_command(
     checkpoint: Path,
@@ -65,7 +62,7 @@ def evaluate_command(
         scenes=scenes,
         weights=weights,
         cache=cache,
-    )
+    ).comparison
     if as_json:
         click.echo(json.dumps(comparison.to_json(), indent=2))
     else:

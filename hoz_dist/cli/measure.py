@@ -2,15 +2,25 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 from hoz_dist.cli.progress import Progress
 from hoz_dist.errors import NotFoundError
+from hoz_dist.evaluation.agents import PolicyAgent
 from hoz_dist.evaluation.benchmark import Benchmark, Comparison, compare
 from hoz_dist.evaluation.loading import load_agent, matching_encoder, open_rooms
 from hoz_dist.nav.categories import SCENES, scene_index
 from hoz_dist.nav.rooms import SPLITS, Split
 from hoz_dist.sim.view_store import ViewStore, default_cache
 from learner.checkpoint import Checkpoint
+
+
+class Measurement(NamedTuple):
+    """What was measured, and on what."""
+
+    comparison: Comparison
+    benchmark: Benchmark
+    agent: PolicyAgent
 
 
 def measure(
@@ -22,7 +32,7 @@ def measure(
     scenes: Sequence[str] = (),
     weights: Path | None = None,
     cache: Path | None = None,
-) -> Comparison:
+) -> Measurement:
     """Run a checkpoint's agent, Random and Oracle on the same episodes.
 
     Args:
@@ -64,4 +74,5 @@ def measure(
     benchmark = Benchmark.of(rooms, split, episodes)
     trials = 2 * len(seeds) + 1  # of Random and the policy; Oracle draws nothing and has one
     with Progress("Evaluating", len(benchmark.episodes) * trials, "episodes") as progress:
-        return compare(benchmark, agent, list(seeds), progress.update)
+        comparison = compare(benchmark, agent, list(seeds), progress.update)
+    return Measurement(comparison, benchmark, agent)

@@ -1,0 +1,80 @@
+"""`hoz-dist actor`: an actor process that trains in its rooms for a learner."""
+
+import os
+import socket
+from pathlib import Path
+
+import click
+
+from hoz_dist.cli.options import cache_option
+from hoz_dist.nav.categories import SCENES
+
+
+@click.command("actor")
+@click.option(
+    "--scene",
+    "scenes",
+    multiple=True,
+    required=True,
+    metavar="SCENE|ROOM",
+    help=f"Scene ({', '.join(SCENES)}: all its training rooms) or training room (kitchen/3); may be repeated.",
+)
+@click.option(
+    "--connect",
+    metavar="ENDPOINT",
+    default="tcp/127.0.0.1:7447",
+    show_default=True,
+    help="Endpoint of the learner or of a router.",
+)
+@click.option("--run", metavar="NAME", help="Name of the run to join.  [default: the only one that is found]")
+@click.option(
+    "--name",
+    help="Name of this actor, unique in the run; its episodes follow from it and the run's seed.  [default: HOST-PID]",
+)
+@click.option(
+    "--weights",
+    type=click.Path(path_type=Path),
+    help="Weights of the resnet18 encoder, .safetensors or .pth.  [default: none needed]",
+)
+@cache_option
+def actor_command(
+    scenes: tuple[str, ...],
+    connect: str,
+    run: str | None,
+    name: str | None,
+    weights: Path | None,
+    cache: Path | None,
+) -> None:
+    """Explore and train in training rooms for the learner at ENDPOINT, until the run is over.
+
+    Any number of actors may join, leave and come back. SIGINT and SIGTERM stop this one cleanly.
+    """
+    import logging
+    import signal
+    import threading
+
+    from hoz_dist.nav.rooms import training_rooms
+    from hoz_dist.wire.session import open_client
+
+    rooms = training_rooms(scenes)
+    logging.basicConfig(level=logging.INFO, format="%(asctime)s %(message)s", datefmt="%H:%M:%S")
+    stop = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: stop.set())
+    with open_client(connect) as session:
+        # Only now, that somebody answers: these take seconds to import.
+        import torch
+
+        from hoz_dist.evaluation.loading import matching_encoder
+        from hoz_dist.sim.view_store import ViewStore, default_cache
+        from workers.actor import Actor
+        from workers.link import LearnerLink
+
+        # A process is one thread: actors share the cores, and one thread adds up the same way every time.
+        torch.set_num_threads(1)
+        actor = name or f"{socket.gethostname()}-{os.getpid()}"
+        with LearnerLink(session, actor, run, stop) as link:
+            encoder = matching_encoder(link.config, weights)
+            store = ViewStore(cache or default_cache(), link.config.picture_size)
+            logging.getLogger("hoz_dist").info("%s joins run %s with %d rooms", actor, link.run, len(rooms))
+            Actor(link, rooms, store, encoder, actor, stop).run()

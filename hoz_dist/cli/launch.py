@@ -1,0 +1,97 @@
+"""Runs a learner and its actors as child processes, and shows how the training goes."""
+
+import signal
+import tempfile
+import threading
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Final
+
+from hoz_dist.cli.processes import Child, Children
+from hoz_dist.cli.progress import Progress
+from hoz_dist.client import HozClient
+from hoz_dist.errors import ConnectionFailedError, HozError
+
+START_S: Final = 60.0
+"""How long the learner may take to answer for the first time, seconds."""
+POLL_S: Final = 1.0
+
+
+def launch(
+    run: Path, endpoint: str, learner: Sequence[str], rooms: Sequence[str], actors: int, cache: Path | None
+) -> None:
+    """Train until the run's budget is used up.
+
+    Args:
+        run: Folder of the run.
+        endpoint: Where the learner listens.
+        learner: Further options of the learner.
+        rooms: Rooms of every actor.
+        actors: Number of actors.
+        cache: Folder of the view store; the default one when None.
+
+    Raises:
+        HozError: A process failed; its own words are in the sentence.
+        KeyboardInterrupt: Stopped by SIGINT or SIGTERM, after the children have stopped cleanly.
+    """
+    # SIGTERM ends the training as Ctrl-C does: by way of the `with` statements.
+    previous = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        with tempfile.TemporaryDirectory(prefix="hoz-dist-") as logs, Children() as children:
+            options = ["learner", "--listen", endpoint, "--run", str(run), "--exit-when-done", *learner]
+            core = children.start("learner", options, Path(logs) / "learner")
+            with _connect(endpoint, core) as client:
+                for number in range(actors):
+                    name = f"actor-{number}"
+                    places = [word for room in rooms for word in ("--scene", room)]
+                    options = ["actor", "--connect", endpoint, "--name", name, *places]
+                    options += [] if cache is None else ["--cache", str(cache)]
+                    children.start(name, options, run / f"{name}.log")
+                _watch(client, core, children)
+    finally:
+        signal.signal(signal.SIGTERM, previous)
+
+
+def _connect(endpoint: str, learner: Child) -> HozClient:
+    """Wait until the learner answers."""
+    pause = threading.Event()
+    for _ in range(int(START_S / 0.2)):
+        if learner.status is not None:
+            # It says what is wrong: a run of another configuration, a folder in use, ...
+            raise HozError(learner.last_words())
+        try:
+            client = HozClient(endpoint)
+        except HozError:
+            pause.wait(0.2)
+        else:
+            return client
+    message = f"The learner did not answer at {endpoint} within {START_S:g} s: {learner.last_words()}"
+    raise ConnectionFailedError(message)
+
+
+def _watch(client: HozClient, learner: Child, children: Children) -> None:
+    """Show the progress until the learner ends."""
+    pause = threading.Event()
+    with Progress("Training", 1.0, None) as progress:
+        while learner.status != 0:
+            for child in children:
+                child.restart_if_killed()
+            try:
+                status = client.status()
+            except HozError:
+                status = None  # it is ending, or starting again
+            if status is not None:
+                progress.update(status["progress"] or 0.0, _summary(status))
+            pause.wait(POLL_S)
+
+
+def _summary(status: dict[str, Any]) -> str:
+    """Say on one line how the training goes."""
+    rooms = sum(len(scene["rooms"]) for scene in status["scenes"].values())
+    actors = sum(process["role"] == "actor" for process in status["processes"])
+    success = status["success"]["overall"]
+    found = "no episodes yet" if success is None else f"success {success:.0%}"
+    return (
+        f"{status['frames'] / 1e6:.2f}M frames  {status['frames_per_second']:,.0f} frames/s  {found}  "
+        f"{rooms} rooms  {actors} actors"
+    )

@@ -1,0 +1,93 @@
+"""What `hoz-dist train` leaves behind and shows at its end: results, pictures, and the commands to try next."""
+
+import json
+from pathlib import Path
+from typing import Final
+
+import click
+from rich.console import Console
+
+from hoz_dist.cli.measure import Measurement, measure
+from hoz_dist.cli.progress import duration
+from hoz_dist.evaluation.table import comparison_table
+from hoz_dist.evaluation.trials import trace_episodes
+from hoz_dist.nav.episode import Episode
+from hoz_dist.sim.catalogue import load_room
+from hoz_dist.viz.trajectory import Trajectory, draw_trajectories
+from hoz_dist.viz.zones import png, scene_graph_figure
+from learner.checkpoint import Checkpoint, load_checkpoint
+
+RESULTS_FILE: Final = "evaluation.json"
+TRAJECTORIES_FILE: Final = "trajectories.png"
+_DRAWN_PER_SCENE: Final = 2
+
+
+def report(run: Path, *, episodes: int, seed: int, cache: Path | None) -> None:
+    """Measure the newest checkpoint of a run, draw its graphs and some trajectories, and say what to try next.
+
+    Args:
+        run: Folder of the run.
+        episodes: Validation episodes in each scene; 0 for none.
+        seed: Seed of the actions.
+        cache: Folder of the view store; the default one when None.
+    """
+    console = Console()
+    checkpoint = load_checkpoint(run)
+    click.echo(
+        f"Trained {checkpoint.frames:,} frames in {checkpoint.episodes:,} episodes and {duration(checkpoint.seconds)}; "
+        f"{checkpoint.version:,} updates."
+    )
+    pictures = _draw_graphs(checkpoint, run)
+    if episodes > 0:
+        measurement = measure(checkpoint, split="val", seeds=[seed], episodes=episodes, cache=cache)
+        console.print(comparison_table(measurement.comparison))
+        results = json.dumps(measurement.comparison.to_json(), indent=2)
+        (run / RESULTS_FILE).write_text(results + "\n", encoding="utf-8")
+        pictures.append(_draw_trajectories(measurement, run / TRAJECTORIES_FILE, seed))
+    click.echo("Pictures: " + ", ".join(map(str, pictures)))
+    click.echo("Try next:")
+    for command in _next_commands(run, checkpoint):
+        click.echo(f"  {command}")
+
+
+def _draw_graphs(checkpoint: Checkpoint, run: Path) -> list[Path]:
+    pictures = []
+    for scene, graph in checkpoint.scene_graphs().items():
+        path = run / f"zones-{scene}.png"
+        path.write_bytes(png(scene_graph_figure(graph)))
+        pictures.append(path)
+    return pictures
+
+
+def _draw_trajectories(measurement: Measurement, path: Path, seed: int) -> Path:
+    """Draw the same episodes, some of each scene, by the agent and by Oracle's length in the title."""
+    benchmark = measurement.benchmark
+    chosen: list[Episode] = []
+    for scene in benchmark.scenes:
+        # Longer episodes show more of the search.
+        of_scene = [episode for episode in benchmark.episodes if episode.room.scene == scene]
+        chosen += sorted(of_scene, key=lambda episode: -episode.optimal)[: len(of_scene) // 2][:: max(1, len(of_scene) // 4)][
+            :_DRAWN_PER_SCENE
+        ]
+    results, ways = trace_episodes(measurement.agent, benchmark.rooms, chosen, seed)
+    graphs = {views.room: views.graph for views in benchmark.rooms}
+    draw_trajectories(
+        [
+            Trajectory(load_room(result.room), graphs[result.room], way, result, measurement.agent.name)
+            for result, way in zip(results, ways, strict=True)
+        ],
+        path,
+    )
+    return path
+
+
+def _next_commands(run: Path, checkpoint: Checkpoint) -> list[str]:
+    scenes = sorted(checkpoint.scene_graphs())
+    scene = scenes[0] if scenes else "kitchen"
+    return [
+        f"hoz-dist evaluate {run} --split test",
+        f"tensorboard --logdir {run / 'tensorboard'}",
+        f"hoz-dist learner --listen tcp/127.0.0.1:7447 --run {run.parent / 'shared'}",
+        f"hoz-dist actor --scene {scene} --connect tcp/127.0.0.1:7447",
+        f"hoz-dist query {scene} --connect tcp/127.0.0.1:7447",
+    ]

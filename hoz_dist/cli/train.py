@@ -1,0 +1,86 @@
+"""`hoz-dist train`: a learner and its actors on this machine, then the results."""
+
+import socket
+from pathlib import Path
+
+import click
+
+from hoz_dist.cli.options import cache_option
+from hoz_dist.nav.categories import SCENES
+
+
+@click.command("train")
+@click.option(
+    "--run",
+    type=click.Path(file_okay=False, path_type=Path),
+    default=Path("runs/default"),
+    show_default=True,
+    help="Folder of the run; one that exists is resumed.",
+)
+@click.option(
+    "--minutes",
+    type=click.FloatRange(0.01),
+    help="Training time, minutes, rendering of the rooms included.  [default: 10, without --frames]",
+)
+@click.option("--frames", type=click.IntRange(1), help="Train for this many frames instead of a time.")
+@click.option("--actors", type=click.IntRange(1, 256), default=2, show_default=True, help="Number of actor processes.")
+@click.option(
+    "--model",
+    default="hoz",
+    show_default=True,
+    help="Method: a3c, object (a3c and the object layer) or hoz (object and scene, zones, done reminder).",
+)
+@click.option("--preset", default="compact", show_default=True, help="Sizes of the network: compact or paper.")
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of parameters and episodes.")
+@click.option(
+    "--scene",
+    "scenes",
+    multiple=True,
+    help=f"Scene or room to train in: {', '.join(SCENES)}, kitchen/3; may be repeated.  [default: all scenes]",
+)
+@click.option(
+    "--episodes",
+    type=click.IntRange(0, 100_000),
+    default=400,
+    show_default=True,
+    help="Validation episodes in each scene afterwards; 0 for no evaluation.",
+)
+@cache_option
+def train_command(
+    run: Path,
+    minutes: float | None,
+    frames: int | None,
+    actors: int,
+    model: str,
+    preset: str,
+    seed: int,
+    scenes: tuple[str, ...],
+    episodes: int,
+    cache: Path | None,
+) -> None:
+    """Train on this machine, then measure the agent on unseen validation rooms and draw pictures.
+
+    Starts one learner and some actors, which find each other over Zenoh on a loopback port. Ctrl-C stops them cleanly; the
+    same command then goes on where the run was.
+    """
+    from hoz_dist.cli.launch import launch
+    from hoz_dist.cli.report import report
+    from hoz_dist.errors import InvalidValueError
+    from hoz_dist.nav.rooms import training_rooms
+
+    if minutes is not None and frames is not None:
+        message = "A run's budget is either --minutes or --frames; give one of them."
+        raise InvalidValueError(message)
+    rooms = training_rooms(scenes or SCENES)
+    minutes = 10.0 if minutes is None and frames is None else minutes
+    learner = ["--method", model, "--preset", preset, "--seed", str(seed)]
+    learner += ["--minutes", str(minutes)] if frames is None else ["--frames", str(frames)]
+    launch(run, f"tcp/127.0.0.1:{_free_port()}", learner, [str(room) for room in rooms], actors, cache)
+    report(run, episodes=episodes, seed=seed, cache=cache)
+
+
+def _free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port: int = probe.getsockname()[1]
+    return port

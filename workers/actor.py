@@ -1,0 +1,164 @@
+"""The actor: joins a run, gets its rooms ready, rolls out, and pushes gradients until the run is over.
+
+Everything happens in one thread and in one order, counted in updates, not in seconds: one actor with one seed does the
+same again. The wire's own threads only keep what arrived.
+"""
+
+import logging
+import threading
+import time
+import zlib
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+
+from hoz_dist.errors import HozError
+from hoz_dist.graph.room_graph import RoomGraph
+from hoz_dist.nav.encoder import VisualEncoder
+from hoz_dist.nav.episode import EpisodeResult
+from hoz_dist.nav.rooms import RoomId
+from hoz_dist.sim.batch_env import BatchEnv
+from hoz_dist.sim.view_store import ViewStore
+from hoz_dist.wire.messages import Accepted, Refused
+from hoz_dist.wire.rejection import Reason
+from hoz_dist.wire.waiting import StoppedError
+from workers.collector import Collector, Update
+from workers.link import LearnerLink
+from workers.preparation import RoomPreparation
+
+_log = logging.getLogger(__name__)
+UPDATES_PER_ROOM: Final = 2
+"""Updates between two rooms that are got ready: training begins with the first room, and soon has all."""
+REPORT_UPDATES: Final = 5
+"""Updates between two reports of finished episodes."""
+
+
+@dataclass
+class _Report:
+    """What happened since the last report."""
+
+    began: float = field(default_factory=time.monotonic)
+    frames: int = 0
+    updates: int = 0
+    lag: int = 0
+    episodes: list[EpisodeResult] = field(default_factory=list)
+
+
+class Actor:
+    """One actor process's work.
+
+    Args:
+        link: To the learner.
+        rooms: Rooms to train in.
+        store: The view store.
+        encoder: The visual encoder, the one of the run.
+        name: Name of the actor; with the run's seed it seeds the episodes and actions.
+        stop: Ends the work at the next step.
+    """
+
+    def __init__(
+        self,
+        link: LearnerLink,
+        rooms: Sequence[RoomId],
+        store: ViewStore,
+        encoder: VisualEncoder,
+        name: str,
+        stop: threading.Event,
+    ) -> None:
+        config = link.config
+        rng = np.random.default_rng([config.seed, zlib.crc32(name.encode())])
+        self._link = link
+        self._stop = stop
+        self._preparation = RoomPreparation(rooms, store, encoder, zones=config.zones, actor=name)
+        self._env = BatchEnv(config.batch, rng)
+        self._collector = Collector(config, self._env, rng)
+        self._graph_versions: dict[str, tuple[int, int]] = {}
+        self._report = _Report()
+        self._newest: tuple[int, int] | None = None
+        self._epoch: int | None = None
+        self._room_graphs: list[RoomGraph] = []
+
+    def run(self) -> None:
+        """Work until the run is over or `stop` is set."""
+        try:
+            self._prepare_room()
+            updates = 0
+            while not self._stop.is_set():
+                if self._preparation.waiting and updates % UPDATES_PER_ROOM == UPDATES_PER_ROOM - 1:
+                    self._prepare_room()
+                self._refresh_graphs()
+                if not self._update():
+                    _log.info("the run is over")
+                    return
+                updates += 1
+        except StoppedError:
+            _log.info("stopped")
+
+    def _prepare_room(self) -> None:
+        room = self._preparation.next(self._check_stop)
+        self._push_room_graph(room.graph)
+        self._room_graphs.append(room.graph)
+        self._env.add_room(room.views)
+        _log.info("%s is ready; %d rooms to go", room.views.room, self._preparation.waiting)
+
+    def _push_room_graph(self, graph: RoomGraph) -> None:
+        reply = self._link.push_room_graph(graph)
+        if isinstance(reply, Refused) and reply.reason != Reason.FINISHED:
+            message = f"The learner refused the graph of {graph.room} ({reply.reason}): {reply.detail}."
+            raise HozError(message)
+
+    def _check_stop(self, done: int, total: int) -> None:
+        del done, total
+        if self._stop.is_set():
+            raise StoppedError
+
+    def _refresh_graphs(self) -> None:
+        """Use the scene graphs that are new."""
+        for scene, graph in self._link.scene_graphs().items():
+            stamp = (graph.version, len(graph.rooms))
+            if self._graph_versions.get(scene) != stamp:
+                self._collector.bank.put(graph)
+                self._graph_versions[scene] = stamp
+
+    def _update(self) -> bool:
+        """Fetch parameters, roll out, push the gradient; False when the run is over."""
+        parameters = self._link.parameters(self._newest)
+        if self._epoch not in {None, parameters.head.epoch}:
+            # A restarted learner knows what its last checkpoint held; a room graph it has already is no change.
+            for graph in self._room_graphs:
+                self._push_room_graph(graph)
+        self._epoch = parameters.head.epoch
+        self._collector.parameters.load(parameters.vector)
+        update = self._collector.roll_out()
+        reply = self._link.push_gradient(update.gradient, update.frames, parameters.head.stamp)
+        match reply:
+            case Accepted(epoch, version):
+                self._newest = (epoch, version)
+                return self._account(update, lag=version - 1 - parameters.head.version)
+            case Refused(Reason.FINISHED):
+                return False
+            case Refused(reason, detail):
+                # A new epoch or too old a version: the next rollout begins with newer parameters.
+                _log.warning("a gradient was refused (%s): %s", reason, detail)
+                self._newest = None
+        return True
+
+    def _account(self, update: Update, lag: int) -> bool:
+        """Take an applied update into the report; False when the run is over."""
+        report = self._report
+        report.frames += update.frames
+        report.updates += 1
+        report.lag += max(lag, 0)
+        report.episodes += update.finished
+        if report.updates < REPORT_UPDATES:
+            return True
+        reply = self._link.push_episodes(
+            report.episodes,
+            frames=report.frames,
+            frames_per_second=report.frames / (time.monotonic() - report.began),
+            lag=report.lag / report.updates,
+        )
+        self._report = _Report()
+        return not (isinstance(reply, Refused) and reply.reason == Reason.FINISHED)
