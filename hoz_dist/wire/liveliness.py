@@ -1,0 +1,73 @@
+"""Membership: who holds a live token. A killed process loses its token within milliseconds."""
+
+import logging
+from types import TracebackType
+from typing import NamedTuple, Self
+
+import zenoh
+from zenoh import LivelinessToken, Session
+from zenoh.handlers import FifoChannel
+
+from hoz_dist.wire.draining import Drain
+from hoz_dist.wire.keys import Keys, check_name
+
+_log = logging.getLogger(__name__)
+
+
+class Member(NamedTuple):
+    """A process that takes part in a run."""
+
+    role: str
+    """``learner`` or ``actor``."""
+    id: str
+    """Its name."""
+
+
+def declare_alive(session: Session, keys: Keys, member: Member) -> LivelinessToken:
+    """Declare a token that lives as long as the session; use it in a ``with`` statement or keep it.
+
+    Raises:
+        InvalidValueError: The role or the name is not fit for a key.
+    """
+    key = keys.alive(check_name("role", member.role), check_name("process", member.id))
+    return session.liveliness().declare_token(key)
+
+
+class Members:
+    """Follows who takes part in a run.
+
+    Args:
+        session: Session to watch on.
+        keys: Keys of the run.
+    """
+
+    def __init__(self, session: Session, keys: Keys) -> None:
+        self._members: frozenset[Member] = frozenset()
+        # `history` reports the tokens that exist already; a get beside it would find none (measured).
+        subscriber = session.liveliness().declare_subscriber(keys.all_alive, FifoChannel(1024), history=True)
+        self._drain = Drain(subscriber, self._follow, "follows members")
+
+    def current(self) -> tuple[Member, ...]:
+        """Return who holds a token now, sorted."""
+        return tuple(sorted(self._members))
+
+    def close(self) -> None:
+        """Stop watching."""
+        self._drain.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _follow(self, change: zenoh.Sample) -> None:
+        role, name = str(change.key_expr).split("/")[-2:]
+        if change.kind == zenoh.SampleKind.PUT:
+            self._members |= {Member(role, name)}
+            _log.info("%s %s joined", role, name)
+        else:
+            self._members -= {Member(role, name)}
+            _log.info("%s %s left", role, name)

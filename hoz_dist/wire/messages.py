@@ -1,0 +1,401 @@
+"""The messages, frozen and checked when they are made.
+
+Every message can be made only from values that may travel, so that a receiver never sees another one. What the wire
+cannot know (the number of parameters, the epoch, how old a gradient may be) is the learner's to judge.
+"""
+
+from dataclasses import dataclass
+from typing import Annotated, Any, ClassVar, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hoz_dist.errors import UnknownNameError
+from hoz_dist.nav.categories import SCENES, TARGETS
+from hoz_dist.nav.episode import EpisodeResult
+from hoz_dist.nav.rooms import RoomId
+from hoz_dist.wire.keys import NAME_PATTERN
+from hoz_dist.wire.rejection import Reason, RejectedError
+from hoz_dist.wire.schema import Bool, Counts, Int, JsonObject, Many, OneOf, Real, Record, Spec, Structure, Tensor, Text
+
+MAX_PARAMETERS: Final = 30_000_000
+"""Largest number of policy parameters; three times the paper's sizes, and within Zenoh's largest message."""
+MAX_ZONES: Final = 64
+MAX_EPISODES: Final = 4096
+_SMALL: Final = 64 * 1024
+_GRAPH: Final = 1024 * 1024
+
+_NAME: Final = Text(64, NAME_PATTERN)
+_DIGEST: Final = Text(64)
+_SCENE: Final = OneOf(frozenset(SCENES))
+_CATEGORIES: Final = Many(OneOf(frozenset(TARGETS)), len(TARGETS))
+_VECTOR: Final = Tensor("float32", rank=1, most=MAX_PARAMETERS)
+_NODES: Final = Tensor("float64", rank=2, most=MAX_ZONES * len(TARGETS), low=0.0, high=1.0)
+_EDGES: Final = Tensor("float64", rank=2, most=MAX_ZONES**2, low=0.0, high=1.0)
+_ZONE: Final = Int(0, MAX_ZONES - 1)
+
+
+class RoomName:
+    """Spec of a room; ``kitchen/3`` on the wire, a `RoomId` here."""
+
+    def pack(self, value: RoomId) -> object:
+        """Return the room's name."""
+        return str(value)
+
+    def unpack(self, raw: object, where: str) -> object:
+        """Return the room of that name."""
+        Text(64).check(raw, where)
+        try:
+            return RoomId.parse(str(raw))
+        except UnknownNameError as error:
+            raise RejectedError(Reason.NAME, f"{where}: {error}") from error
+
+    def check(self, value: Any, where: str) -> None:
+        """Judge a value; see `Spec.check`."""
+        if type(value) is not RoomId:
+            raise RejectedError(Reason.TYPE, f"{where} is not a room but {type(value).__name__}")
+        self.unpack(str(value), where)
+
+
+_ROOM: Final = RoomName()
+
+
+class EpisodeFields:
+    """Spec of an `EpisodeResult`; a list of its fields in order on the wire, since there are many of them."""
+
+    FIELDS: ClassVar[tuple[Spec, ...]] = (
+        _ROOM,
+        Int(0, len(TARGETS) - 1),
+        Bool(),
+        Int(1, 10**6),
+        Int(0, 10**6),
+        Bool(),
+        Int(0, 10**6),
+    )
+
+    def pack(self, value: EpisodeResult) -> object:
+        """Return the list of the fields."""
+        return [spec.pack(field) for spec, field in zip(self.FIELDS, value, strict=True)]
+
+    def unpack(self, raw: object, where: str) -> object:
+        """Return the result with those fields."""
+        if type(raw) is not list or len(raw) != len(self.FIELDS):
+            raise RejectedError(Reason.TYPE, f"{where} is not a list of {len(self.FIELDS)} fields")
+        return EpisodeResult._make(spec.unpack(field, where) for spec, field in zip(self.FIELDS, raw, strict=True))
+
+    def check(self, value: Any, where: str) -> None:
+        """Judge a value; see `Spec.check`."""
+        if type(value) is not EpisodeResult:
+            raise RejectedError(Reason.TYPE, f"{where} is not an episode's result but {type(value).__name__}")
+        for name, spec, field in zip(value._fields, self.FIELDS, value, strict=True):
+            spec.check(field, f"{where}.{name}")
+        if value.moves > value.actions:
+            raise RejectedError(Reason.RANGE, f"{where} has more moves than actions")
+
+
+class Message(Structure):
+    """Base of everything that travels.
+
+    Attributes:
+        KIND: Name on the wire.
+        MOST_BYTES: Longest encoded form that is read at all.
+    """
+
+    KIND: ClassVar[str]
+    MOST_BYTES: ClassVar[int] = _SMALL
+
+
+@dataclass(frozen=True, eq=False)
+class Push(Message):
+    """Base of what an actor pushes; ``(actor, incarnation, sequence)`` tells a repetition from a new message.
+
+    Attributes:
+        actor: Name of the actor, the last part of the key of its gradients.
+        incarnation: Random number that an actor process draws when it starts.
+        sequence: Counts the pushes of this incarnation and kind, from 0.
+    """
+
+    actor: Annotated[str, _NAME]
+    incarnation: Annotated[int, Int()]
+    sequence: Annotated[int, Int()]
+
+
+@dataclass(frozen=True, eq=False)
+class GradientPush(Push):
+    """A gradient.
+
+    Attributes:
+        epoch: Epoch of the parameters that it was computed on.
+        version: Version of the parameters that it was computed on.
+        frames: Environment steps that it was computed from.
+        gradient: [P] f32, in the order of the parameter vector.
+    """
+
+    KIND: ClassVar[str] = "gradient"
+    MOST_BYTES: ClassVar[int] = 4 * MAX_PARAMETERS + _SMALL
+
+    epoch: Annotated[int, Int()]
+    version: Annotated[int, Int()]
+    frames: Annotated[int, Int(1)]
+    gradient: Annotated[NDArray[np.float32], _VECTOR]
+
+
+@dataclass(frozen=True, eq=False)
+class EpisodesPush(Push):
+    """Finished episodes and how the actor gets on.
+
+    Attributes:
+        frames: Environment steps since the actor's last push of episodes.
+        frames_per_second: Its speed since then.
+        lag: Mean policy lag of its gradients since then, in parameter versions.
+        episodes: Results, in the order in which the episodes ended.
+    """
+
+    KIND: ClassVar[str] = "episodes"
+    MOST_BYTES: ClassVar[int] = 128 * MAX_EPISODES + _SMALL
+
+    frames: Annotated[int, Int()]
+    frames_per_second: Annotated[float, Real(0.0)]
+    lag: Annotated[float, Real(0.0)]
+    episodes: Annotated[tuple[EpisodeResult, ...], Many(EpisodeFields(), MAX_EPISODES)]
+
+
+@dataclass(frozen=True, eq=False)
+class RoomGraphPush(Push):
+    """A room graph.
+
+    Attributes:
+        room: The room.
+        digest: Digest of the room that was explored.
+        categories: [N] names of the columns of ``nodes``.
+        nodes: [K, N] f64 zone nodes, in [0, 1].
+        edges: [K, K] f64 zone edges, in [0, 1].
+    """
+
+    KIND: ClassVar[str] = "room_graph_push"
+    MOST_BYTES: ClassVar[int] = _GRAPH
+
+    room: Annotated[RoomId, _ROOM]
+    digest: Annotated[str, _DIGEST]
+    categories: Annotated[tuple[str, ...], _CATEGORIES]
+    nodes: Annotated[NDArray[np.float64], _NODES]
+    edges: Annotated[NDArray[np.float64], _EDGES]
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _check_graph(self.nodes, self.edges, self.categories)
+
+
+@dataclass(frozen=True, eq=False)
+class Accepted(Message):
+    """The push counts, now or because it already did; the newest parameters are those of this epoch and version."""
+
+    KIND: ClassVar[str] = "accepted"
+
+    epoch: Annotated[int, Int()]
+    version: Annotated[int, Int()]
+
+
+@dataclass(frozen=True, eq=False)
+class Busy(Message):
+    """The learner has too much to do; push again after a while."""
+
+    KIND: ClassVar[str] = "busy"
+
+
+@dataclass(frozen=True, eq=False)
+class Refused(Message):
+    """The message does not count and must not be repeated; or the question cannot be answered."""
+
+    KIND: ClassVar[str] = "refused"
+
+    reason: Annotated[str, OneOf(frozenset(Reason))]
+    detail: Annotated[str, Text(2048)]
+
+
+PushReply = Accepted | Busy | Refused
+
+
+@dataclass(frozen=True, eq=False)
+class ParametersHead(Message):
+    """Which parameters are the newest.
+
+    Attributes:
+        epoch: Grows by one whenever a learner starts.
+        version: Number of updates applied to the parameters; never falls within an epoch.
+        digest: xxh3_64 of the little-endian f32 vector, 16 hexadecimal digits.
+        size: P, the number of parameters.
+        shards: Number of shards that the vector is served in.
+    """
+
+    KIND: ClassVar[str] = "parameters"
+
+    epoch: Annotated[int, Int()]
+    version: Annotated[int, Int()]
+    digest: Annotated[str, _DIGEST]
+    size: Annotated[int, Int(1, MAX_PARAMETERS)]
+    shards: Annotated[int, Int(1, 1024)]
+
+    @property
+    def stamp(self) -> tuple[int, int]:
+        """Epoch and version; a later one is greater."""
+        return self.epoch, self.version
+
+
+@dataclass(frozen=True, eq=False)
+class ParametersShard(Message):
+    """A part of the parameter vector.
+
+    Attributes:
+        head: The parameters that it is a part of.
+        shard: Its number, from 0; the vector is the shards in order.
+        values: f32, the part.
+    """
+
+    KIND: ClassVar[str] = "shard"
+    MOST_BYTES: ClassVar[int] = 8 * 1024 * 1024 + _SMALL
+
+    head: Annotated[ParametersHead, Record(ParametersHead)]
+    shard: Annotated[int, Int(0, 1023)]
+    values: Annotated[NDArray[np.float32], Tensor("float32", rank=1, most=2 * 1024 * 1024)]
+
+
+@dataclass(frozen=True, eq=False)
+class ConfigReply(Message):
+    """All that an actor needs to join.
+
+    Attributes:
+        run: Name of the run.
+        epoch: Epoch of the learner.
+        categories: [N] target categories, in the order of the graphs' columns.
+        config: The run's configuration, what JSON can hold.
+    """
+
+    KIND: ClassVar[str] = "config"
+
+    run: Annotated[str, _NAME]
+    epoch: Annotated[int, Int()]
+    categories: Annotated[tuple[str, ...], _CATEGORIES]
+    config: Annotated[dict[str, Any], JsonObject()]
+
+
+@dataclass(frozen=True, eq=False)
+class SceneGraphReply(Message):
+    """A scene graph.
+
+    Attributes:
+        scene: The scene.
+        version: Number of times that it was rebuilt.
+        rooms: Names of the rooms that it merges, in ascending number.
+        categories: [N] names of the columns of ``nodes``.
+        nodes: [K, N] f64 zone nodes, in [0, 1].
+        edges: [K, K] f64 zone edges, in [0, 1].
+    """
+
+    KIND: ClassVar[str] = "scene_graph"
+    MOST_BYTES: ClassVar[int] = _GRAPH
+
+    scene: Annotated[str, _SCENE]
+    version: Annotated[int, Int()]
+    rooms: Annotated[tuple[RoomId, ...], Many(_ROOM, 1024)]
+    categories: Annotated[tuple[str, ...], _CATEGORIES]
+    nodes: Annotated[NDArray[np.float64], _NODES]
+    edges: Annotated[NDArray[np.float64], _EDGES]
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _check_graph(self.nodes, self.edges, self.categories)
+
+
+@dataclass(frozen=True, eq=False)
+class RoomGraphReply(Message):
+    """A room graph; the fields are those of `RoomGraphPush`."""
+
+    KIND: ClassVar[str] = "room_graph"
+    MOST_BYTES: ClassVar[int] = _GRAPH
+
+    room: Annotated[RoomId, _ROOM]
+    digest: Annotated[str, _DIGEST]
+    categories: Annotated[tuple[str, ...], _CATEGORIES]
+    nodes: Annotated[NDArray[np.float64], _NODES]
+    edges: Annotated[NDArray[np.float64], _EDGES]
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _check_graph(self.nodes, self.edges, self.categories)
+
+
+@dataclass(frozen=True, eq=False)
+class PlanReply(Message):
+    """A plan on a scene graph; zones are numbered from 0.
+
+    Attributes:
+        current: Zone that fits what is seen best.
+        target: Zone where the target is likeliest.
+        subgoal: Zone to go to next.
+        path: Zones from current to target; one zone when they are the same.
+        probability: Product of the path's edges.
+    """
+
+    KIND: ClassVar[str] = "plan"
+
+    current: Annotated[int, _ZONE]
+    target: Annotated[int, _ZONE]
+    subgoal: Annotated[int, _ZONE]
+    path: Annotated[tuple[int, ...], Many(_ZONE, MAX_ZONES)]
+    probability: Annotated[float, Real(0.0, 1.0)]
+
+
+@dataclass(frozen=True, eq=False)
+class ProcessStatus(Structure):
+    """A process that holds a live token.
+
+    Attributes:
+        role: ``learner`` or ``actor``.
+        id: Its name.
+        rooms: Rooms that it trains in, as far as the learner knows.
+        frames: Environment steps that it has contributed.
+        frames_per_second: Its speed, as it last said.
+        lag: Mean policy lag of its gradients, as it last said.
+        rejected: Number of its messages that were rejected.
+    """
+
+    role: Annotated[str, _NAME]
+    id: Annotated[str, _NAME]
+    rooms: Annotated[tuple[str, ...], Many(Text(64), 256)] = ()
+    frames: Annotated[int, Int()] = 0
+    frames_per_second: Annotated[float, Real(0.0)] = 0.0
+    lag: Annotated[float, Real(0.0)] = 0.0
+    rejected: Annotated[int, Int()] = 0
+
+
+@dataclass(frozen=True, eq=False)
+class StatusReply(Message):
+    """Who takes part and how it goes.
+
+    Attributes:
+        version: Version of the newest parameters.
+        epoch: Epoch of the learner.
+        frames: Environment steps trained on so far.
+        processes: Holders of a live token.
+        rejected: Number of rejected messages by reason; reasons that never occurred are left out.
+    """
+
+    KIND: ClassVar[str] = "status"
+    MOST_BYTES: ClassVar[int] = 4 * 1024 * 1024
+
+    version: Annotated[int, Int()]
+    epoch: Annotated[int, Int()]
+    frames: Annotated[int, Int()]
+    processes: Annotated[tuple[ProcessStatus, ...], Many(Record(ProcessStatus), 4096)]
+    rejected: Annotated[dict[str, int], Counts()]
+
+
+def _check_graph(nodes: NDArray[np.float64], edges: NDArray[np.float64], categories: tuple[str, ...]) -> None:
+    """Judge whether nodes [K, N], edges [K, K] and categories [N] belong together."""
+    zones, columns = nodes.shape
+    if zones > MAX_ZONES or columns != len(categories) or edges.shape != (zones, zones):
+        detail = f"nodes {nodes.shape}, edges {edges.shape} and {len(categories)} categories do not fit"
+        raise RejectedError(Reason.SHAPE, detail)
+    if len(set(categories)) != len(categories):
+        raise RejectedError(Reason.NAME, "a category occurs twice")

@@ -1,0 +1,65 @@
+"""Queryables that are drained by a thread of their own, and how a query is answered."""
+
+import contextlib
+from collections.abc import Callable
+from typing import Final
+
+import zenoh
+from zenoh import Query, Session
+from zenoh.handlers import FifoChannel
+
+from hoz_dist.errors import HozError, NotFoundError, UnknownNameError
+from hoz_dist.wire.codec import encode
+from hoz_dist.wire.draining import Drain
+from hoz_dist.wire.messages import Busy, Message, Refused
+from hoz_dist.wire.rejection import Reason
+
+_CHANNEL: Final = 16
+"""Queries that Zenoh holds while the thread is busy with the one before; more of them block the sender's transport."""
+
+
+def answer(query: Query, key: str, message: Message) -> None:
+    """Answer a query with one message and let go of it.
+
+    Args:
+        query: The query.
+        key: Concrete key of what the message tells.
+        message: ``busy`` and ``refused`` travel as error replies, for which the key does not matter.
+    """
+    with query:
+        if isinstance(message, Busy | Refused):
+            query.reply_err(encode(message))
+        else:
+            query.reply(key, encode(message))
+
+
+def refusal_of(error: HozError) -> Refused:
+    """Return the refusal that makes the asking side raise the same error; see `error_of`."""
+    match error:
+        case UnknownNameError():
+            reason = Reason.NAME
+        case NotFoundError():
+            reason = Reason.NOT_FOUND
+        case _:
+            reason = Reason.MALFORMED
+    return Refused(reason.value, str(error)[:2048])
+
+
+def declare_queryable(session: Session, key_expr: str, handle: Callable[[Query], None]) -> Drain[Query]:
+    """Answer the queries on some keys in a thread.
+
+    Args:
+        session: Session to declare it on.
+        key_expr: Keys that it answers for.
+        handle: Answers a query, or keeps it to be answered later. Should it raise, the query is refused.
+    """
+
+    def handle_or_refuse(query: Query) -> None:
+        try:
+            handle(query)
+        except Exception:
+            with contextlib.suppress(zenoh.ZError):  # it may have been answered already
+                answer(query, "", Refused(Reason.INTERNAL.value, "the learner failed to answer; its log says why"))
+            raise
+
+    return Drain(session.declare_queryable(key_expr, FifoChannel(_CHANNEL)), handle_or_refuse, f"answers {key_expr}")

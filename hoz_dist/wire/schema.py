@@ -1,0 +1,343 @@
+"""What a field of a message may hold: one small class per type of field.
+
+A message states its fields as ``name: Annotated[python type, spec]``. Each spec turns a value into what msgpack can
+hold (`pack`), back (`unpack`: structure only), and judges a value (`check`). A message checks all its fields whenever
+it is made, so what is sent and what is received obey the same rules, and a large tensor is looked at only once.
+"""
+
+import dataclasses
+import math
+import re
+from collections.abc import Mapping, Sequence
+from collections.abc import Set as AbstractSet
+from typing import Annotated, Any, ClassVar, Final, Protocol, get_args, get_origin, get_type_hints
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hoz_dist.wire.rejection import Reason, RejectedError
+
+MAX_INT: Final = 2**63 - 1
+DTYPES: Final[Mapping[str, np.dtype[Any]]] = {"float32": np.dtype("<f4"), "float64": np.dtype("<f8")}
+"""Element types by their name on the wire; always little-endian."""
+
+
+class Spec(Protocol):
+    """What a field may hold."""
+
+    def pack(self, value: Any) -> object:
+        """Return what msgpack can hold for a value that `check` accepts."""
+        ...
+
+    def unpack(self, raw: object, where: str) -> object:
+        """Return the value for what msgpack held.
+
+        Raises:
+            RejectedError: The structure is not that of a value.
+        """
+        ...
+
+    def check(self, value: Any, where: str) -> None:
+        """Judge a value.
+
+        Raises:
+            RejectedError: The value is not allowed.
+        """
+        ...
+
+
+class Scalar:
+    """Base of the specs whose values msgpack holds as they are."""
+
+    def pack(self, value: Any) -> object:
+        """Return the value itself."""
+        return value
+
+    def unpack(self, raw: object, where: str) -> object:  # noqa: ARG002 - the field's name is for specs that can fail
+        """Return the value itself."""
+        return raw
+
+
+@dataclasses.dataclass(frozen=True)
+class Int(Scalar):
+    """A whole number from ``low`` to ``high``, both included."""
+
+    low: int = 0
+    high: int = MAX_INT
+
+    def check(self, value: Any, where: str) -> None:
+        """Judge a value; see `Spec.check`."""
+        if type(value) is not int:  # bool is an int to Python, not on the wire
+            raise _wrong_type(where, "a whole number", value)
+        if not self.low <= value <= self.high:
+            raise RejectedError(Reason.RANGE, f"{where} is {value}, not in {self.low}..{self.high}")
+
+
+@dataclasses.dataclass(frozen=True)
+class Real(Scalar):
+    """A finite number from ``low`` to ``high``, both included."""
+
+    low: float = -math.inf
+    high: float = math.inf
+
+    def unpack(self, raw: object, where: str) -> object:  # noqa: ARG002 - as in Scalar
+        """Return a float; languages with one number type send 2.0 as 2."""
+        return float(raw) if type(raw) is int else raw
+
+    def check(self, value: Any, where: str) -> None:
+        """Judge a value; see `Spec.check`."""
+        if type(value) is not float:
+            raise _wrong_type(where, "a number", value)
+        if not math.isfinite(value):
+            raise RejectedError(Reason.NONFINITE, f"{where} is {value}")
+        if not self.low <= value <= self.high:
+            raise RejectedError(Reason.RANGE, f"{where} is {value}, not in {self.low}..{self.high}")
+
+
+@dataclasses.dataclass(frozen=True)
+class Bool(Scalar):
+    """True or false."""
+
+    def check(self, value: Any, where: str) -> None:
+        """Judge a value; see `Spec.check`."""
+        if type(value) is not bool:
+            raise _wrong_type(where, "true or false", value)
+
+
+@dataclasses.dataclass(frozen=True)
+class Text(Scalar):
+    """A text of at most ``longest`` characters, all of it of a pattern where one is given."""
+
+    longest: int = 256
+    pattern: re.Pattern[str] | None = None
+
+    def check(self, value: Any, where: str) -> None:
+        """Judge a value; see `Spec.check`."""
+        if type(value) is not str:
+            raise _wrong_type(where, "a text", value)
+        if len(value) > self.longest:
+            raise RejectedError(Reason.SIZE, f"{where} has {len(value)} characters, more than {self.longest}")
+        if self.pattern is not None and not self.pattern.fullmatch(value):
+            raise RejectedError(Reason.NAME, f"{where} is not well formed: {value[:80]!r}")
+
+
+@dataclasses.dataclass(frozen=True)
+class OneOf(Scalar):
+    """One of some known names."""
+
+    names: frozenset[str]
+
+    def check(self, value: Any, where: str) -> None:
+        """Judge a value; see `Spec.check`."""
+        if type(value) is not str:
+            raise _wrong_type(where, "a text", value)
+        if value not in self.names:
+            raise RejectedError(Reason.NAME, f"{where} is unknown: {value[:80]!r}")
+
+
+@dataclasses.dataclass(frozen=True)
+class Tensor:
+    """An array of finite numbers.
+
+    Attributes:
+        dtype: Name of the element type in `DTYPES`.
+        rank: Number of axes.
+        most: Largest number of elements.
+        low: Smallest element allowed.
+        high: Largest element allowed.
+    """
+
+    dtype: str
+    rank: int
+    most: int
+    low: float = -math.inf
+    high: float = math.inf
+
+    FIELDS: ClassVar[frozenset[str]] = frozenset({"dtype", "shape", "data"})
+
+    def pack(self, value: NDArray[Any]) -> object:
+        """Return the map of dtype, shape and raw bytes; the bytes are a view, so that msgpack makes the only copy."""
+        array = np.ascontiguousarray(value, DTYPES[self.dtype])
+        return {"dtype": self.dtype, "shape": list(array.shape), "data": array.reshape(-1).data.cast("B")}
+
+    def unpack(self, raw: object, where: str) -> object:
+        """Return a read-only array on the received bytes."""
+        fields = _map_of(raw, self.FIELDS, where)
+        shape, data = fields["shape"], fields["data"]
+        if fields["dtype"] != self.dtype:
+            raise RejectedError(Reason.DTYPE, f"{where} is {str(fields['dtype'])[:40]}, not {self.dtype}")
+        if type(shape) is not list or not all(type(side) is int and side >= 0 for side in shape):
+            raise RejectedError(Reason.SHAPE, f"{where} has no valid shape")
+        if type(data) is not bytes:
+            raise RejectedError(Reason.TYPE, f"{where}.data is not bytes but {type(data).__name__}")
+        if len(data) != math.prod(shape) * DTYPES[self.dtype].itemsize or len(shape) != self.rank:
+            raise RejectedError(Reason.SHAPE, f"{where} has {len(data)} bytes for the shape {shape[:8]}")
+        return np.frombuffer(data, DTYPES[self.dtype]).reshape(shape)
+
+    def check(self, value: Any, where: str) -> None:
+        """Judge a value; see `Spec.check`."""
+        if not isinstance(value, np.ndarray):
+            raise _wrong_type(where, "an array", value)
+        if value.dtype != DTYPES[self.dtype]:
+            raise RejectedError(Reason.DTYPE, f"{where} is {value.dtype}, not {self.dtype}")
+        if value.ndim != self.rank or value.size == 0:
+            raise RejectedError(Reason.SHAPE, f"{where} has the shape {value.shape}, not {self.rank} filled axes")
+        if value.size > self.most:
+            raise RejectedError(Reason.SIZE, f"{where} has {value.size} elements, more than {self.most}")
+        if not _all_finite(value):
+            raise RejectedError(Reason.NONFINITE, f"{where} holds NaN or infinity")
+        if (self.low > -math.inf and value.min() < self.low) or (self.high < math.inf and value.max() > self.high):
+            raise RejectedError(Reason.RANGE, f"{where} has an element that is not in {self.low}..{self.high}")
+
+
+@dataclasses.dataclass(frozen=True)
+class Many:
+    """A tuple of at most ``most`` values of one spec; a list on the wire."""
+
+    of: Spec
+    most: int
+
+    def pack(self, value: Sequence[Any]) -> object:
+        """Return the list of the packed values."""
+        return [self.of.pack(element) for element in value]
+
+    def unpack(self, raw: object, where: str) -> object:
+        """Return the tuple of the unpacked values."""
+        if type(raw) is not list:
+            raise _wrong_type(where, "a list", raw)
+        if len(raw) > self.most:
+            raise RejectedError(Reason.SIZE, f"{where} has {len(raw)} elements, more than {self.most}")
+        return tuple(self.of.unpack(element, f"{where}[{index}]") for index, element in enumerate(raw))
+
+    def check(self, value: Any, where: str) -> None:
+        """Judge a value; see `Spec.check`."""
+        if type(value) is not tuple:
+            raise _wrong_type(where, "a tuple", value)
+        if len(value) > self.most:
+            raise RejectedError(Reason.SIZE, f"{where} has {len(value)} elements, more than {self.most}")
+        for index, element in enumerate(value):
+            self.of.check(element, f"{where}[{index}]")
+
+
+@dataclasses.dataclass(frozen=True)
+class Counts(Scalar):
+    """A map of at most ``most`` short texts to counts."""
+
+    most: int = 64
+
+    def check(self, value: Any, where: str) -> None:
+        """Judge a value; see `Spec.check`."""
+        if type(value) is not dict:
+            raise _wrong_type(where, "a map", value)
+        if len(value) > self.most:
+            raise RejectedError(Reason.SIZE, f"{where} has {len(value)} entries, more than {self.most}")
+        for name, count in value.items():
+            Text(64).check(name, f"a name in {where}")
+            Int().check(count, f"{where}[{name}]")
+
+
+@dataclasses.dataclass(frozen=True)
+class JsonObject(Scalar):
+    """A map of texts to what JSON can hold, at most ``deepest`` levels."""
+
+    deepest: int = 4
+
+    def check(self, value: Any, where: str) -> None:
+        """Judge a value; see `Spec.check`."""
+        if type(value) is not dict:
+            raise _wrong_type(where, "a map", value)
+        self._check_any(value, where, self.deepest)
+
+    def _check_any(self, value: Any, where: str, levels: int) -> None:
+        if levels < 0:
+            raise RejectedError(Reason.SIZE, f"{where} is nested too deep")
+        match value:
+            case dict():
+                for name, element in value.items():
+                    Text(128).check(name, f"a name in {where}")
+                    self._check_any(element, f"{where}.{name}", levels - 1)
+            case list():
+                for element in value:
+                    self._check_any(element, where, levels - 1)
+            case float() if not math.isfinite(value):
+                raise RejectedError(Reason.NONFINITE, f"{where} is {value}")
+            case None | bool() | int() | float() | str():
+                pass
+            case _:
+                raise _wrong_type(where, "a JSON value", value)
+
+
+@dataclasses.dataclass(frozen=True)
+class Record:
+    """A nested `Structure`; a map on the wire."""
+
+    of: "type[Structure]"
+
+    def pack(self, value: "Structure") -> object:
+        """Return the map of the packed fields."""
+        return value.pack()
+
+    def unpack(self, raw: object, where: str) -> object:
+        """Return the structure, checked."""
+        return self.of.unpack(raw, where)
+
+    def check(self, value: Any, where: str) -> None:
+        """Judge a value; see `Spec.check`. A structure has checked itself when it was made."""
+        if type(value) is not self.of:
+            raise _wrong_type(where, self.of.__name__, value)
+
+
+class Structure:
+    """Base of frozen dataclasses whose fields are ``name: Annotated[type, spec]``; checked whenever one is made.
+
+    Attributes:
+        SPECS: The spec of each field.
+    """
+
+    SPECS: ClassVar[dict[str, Spec]] = {}
+
+    def __init_subclass__(cls) -> None:
+        """Gather the specs of the fields, inherited ones first."""
+        hints = get_type_hints(cls, include_extras=True)
+        cls.SPECS = {name: get_args(hint)[1] for name, hint in hints.items() if get_origin(hint) is Annotated}
+
+    def __post_init__(self) -> None:
+        for name, spec in self.SPECS.items():
+            spec.check(getattr(self, name), name)
+
+    def pack(self) -> dict[str, object]:
+        """Return the map of the packed fields."""
+        return {name: spec.pack(getattr(self, name)) for name, spec in self.SPECS.items()}
+
+    @classmethod
+    def unpack(cls, raw: object, where: str) -> "Structure":
+        """Make the structure from what msgpack held.
+
+        Raises:
+            RejectedError: Anything is not as it should be.
+        """
+        fields = _map_of(raw, cls.SPECS.keys(), where)
+        return cls(**{name: spec.unpack(fields[name], name) for name, spec in cls.SPECS.items()})
+
+
+def _map_of(raw: object, names: AbstractSet[str], where: str) -> dict[str, Any]:
+    """Return a map that has exactly those names."""
+    if type(raw) is not dict:
+        raise _wrong_type(where, "a map", raw)
+    missing, unknown = names - raw.keys(), raw.keys() - names
+    if missing or unknown:
+        told = [f"missing {', '.join(sorted(missing))}"] if missing else []
+        told += [f"unknown {', '.join(sorted(map(str, unknown)))[:200]}"] if unknown else []
+        raise RejectedError(Reason.FIELDS, f"{where} has {' and '.join(told)}")
+    return raw
+
+
+def _all_finite(array: NDArray[Any]) -> bool:
+    """Return whether every element is finite; the sum of squares says so in one pass, unless it overflows."""
+    flat = array.reshape(-1)
+    with np.errstate(over="ignore", invalid="ignore"):
+        return bool(np.isfinite(np.dot(flat, flat))) or bool(np.isfinite(flat).all())
+
+
+def _wrong_type(where: str, wanted: str, value: object) -> RejectedError:
+    return RejectedError(Reason.TYPE, f"{where} is not {wanted} but {type(value).__name__}")

@@ -1,0 +1,148 @@
+"""The learner's side: receives pushes and answers questions.
+
+Every queryable has a channel and a thread that drains it at once, because Zenoh drops the transport of a receiver that
+lets messages wait. Pushes are checked and then wait in one bounded queue for the learner; questions are answered on the
+spot from snapshots. Whatever is wrong with a message, the thread lives on and the sender gets one answer.
+"""
+
+from collections.abc import Callable, Mapping
+from types import TracebackType
+from typing import Self
+
+from zenoh import KeyExpr, Query, Session, ZBytes
+
+from hoz_dist.errors import HozError
+from hoz_dist.wire.codec import checksum, decode, encode
+from hoz_dist.wire.inbox import Inbox, Request
+from hoz_dist.wire.keys import Keys
+from hoz_dist.wire.messages import EpisodesPush, GradientPush, Message, Push, Refused, RoomGraphPush
+from hoz_dist.wire.publishing import NewestPublisher
+from hoz_dist.wire.queryable import answer, declare_queryable, refusal_of
+from hoz_dist.wire.rejection import Reason, RejectedError
+from hoz_dist.wire.rejections import Rejections
+from hoz_dist.wire.snapshots import GraphMessage, Snapshots
+
+
+class Server:
+    """Serves a run on a session.
+
+    Args:
+        session: Session of the learner.
+        keys: Keys of the run.
+        snapshots: What questions are answered from.
+        inbox: Where pushes wait; the learner takes them out and answers them.
+    """
+
+    def __init__(self, session: Session, keys: Keys, snapshots: Snapshots, inbox: Inbox | None = None) -> None:
+        self.inbox = inbox or Inbox()
+        self.rejections = Rejections()
+        self.snapshots = snapshots
+        self._session = session
+        self._keys = keys
+        self._publishers: dict[str, NewestPublisher] = {}
+        handlers: dict[str, Callable[[Query], None]] = {
+            keys.all_grads: lambda query: self._receive(query, GradientPush),
+            keys.all_rollouts: lambda query: self._receive(query, EpisodesPush),
+            keys.all_rooms: lambda query: self._receive(query, RoomGraphPush),
+            keys.config: lambda query: answer(query, keys.config, snapshots.config),
+            keys.status: lambda query: answer(query, keys.status, snapshots.status()),
+            keys.all_graphs: self._answer_graph,
+            keys.all_plans: self._answer_plan,
+        }
+        self._queryables = [declare_queryable(session, key, handle) for key, handle in handlers.items()]
+
+    def set_graphs(self, graphs: Mapping[str, GraphMessage]) -> None:
+        """Replace the graphs that are served, and publish those that changed.
+
+        Args:
+            graphs: Graphs by the name of their scene or room. A graph that did not change is the same object as before.
+        """
+        before = self.snapshots.graphs
+        self.snapshots.set_graphs(graphs)
+        for name, graph in graphs.items():
+            if before.get(name) is not graph:
+                if name not in self._publishers:
+                    self._publishers[name] = NewestPublisher(self._session, self._keys.graph(name))
+                self._publishers[name].publish(graph)
+
+    def close(self) -> None:
+        """Stop serving; who asks from now on gets no answer."""
+        for queryable in self._queryables:
+            queryable.close()
+        for publisher in self._publishers.values():
+            publisher.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _receive(self, query: Query, expected: type[Push]) -> None:
+        """Check a push, and let it wait for the learner."""
+        key = str(query.key_expr)
+        payload = query.payload.to_bytes() if query.payload is not None else b""
+        try:
+            message = self._checked(key, payload, query.attachment, expected)
+        except RejectedError as error:
+            self.rejections.count(error.reason, error.detail, sender=key.rpartition("/")[2])
+            answer(query, key, Refused(error.reason.value, error.detail[:2048]))
+            return
+        request = Request(query, message, len(payload), self.rejections)
+        if not self.inbox.offer(request):
+            request.busy()
+
+    def _checked(self, key: str, payload: bytes, attachment: ZBytes | None, expected: type[Push]) -> Push:
+        """Return the message of a push.
+
+        Raises:
+            RejectedError: It was damaged on the way, is not as it should be, or came on the key of another.
+        """
+        if attachment is None or attachment.to_bytes() != checksum(payload):
+            raise RejectedError(Reason.CHECKSUM, f"the {len(payload)} bytes do not have the checksum sent along")
+        message = decode(payload, expected)
+        if key != self._key_of(message):
+            raise RejectedError(Reason.IDENTITY, f"a {message.KIND} of {message.actor} came on {key}")
+        return message
+
+    def _key_of(self, message: Push) -> str:
+        """Return the key that a push must come on."""
+        match message:
+            case GradientPush():
+                return self._keys.grads(message.actor)
+            case EpisodesPush():
+                return self._keys.rollouts(message.actor)
+            case RoomGraphPush():
+                return self._keys.room(message.room)
+            case _:  # pragma: no cover - every kind that is received stands above
+                raise TypeError(message)
+
+    def _answer_graph(self, query: Query) -> None:
+        """Answer with the graph of that name, or with all graphs that a wildcard selects."""
+        prefix = self._keys.graph("")
+        name = str(query.key_expr).removeprefix(prefix)
+        if "*" not in name:
+            _answer_or_refuse(query, lambda: self.snapshots.graph(name))
+            return
+        with query:
+            for name, graph in self.snapshots.graphs.items():
+                if query.key_expr.intersects(KeyExpr(prefix + name)):
+                    query.reply(prefix + name, encode(graph))
+
+    def _answer_plan(self, query: Query) -> None:
+        """Answer with a plan for the target and the seen categories that the parameters name."""
+        scene = str(query.key_expr).removeprefix(self._keys.plan(""))
+        named = (part.partition("=") for part in str(query.parameters).split(";"))
+        parameters = {name: value for name, _, value in named}
+        _answer_or_refuse(query, lambda: self.snapshots.plan(scene, parameters))
+
+
+def _answer_or_refuse(query: Query, make: Callable[[], Message]) -> None:
+    """Answer a question, or say in one sentence what is wrong with it."""
+    try:
+        message = make()
+    except HozError as error:
+        message = refusal_of(error)
+    answer(query, str(query.key_expr), message)

@@ -1,0 +1,113 @@
+"""Opening Zenoh sessions: the learner's, which is the router, and those of actors and queries, which are its clients.
+
+The settings follow what was measured: no multicast (container networks have none), client mode (it reconnects and
+declares everything again by itself), retries from 200 ms to 2 s (the default takes 3.4 s to come back).
+"""
+
+import json
+import re
+from typing import Any, Final
+
+import zenoh
+from zenoh import Session
+
+from hoz_dist.errors import ConnectionFailedError, InvalidValueError
+
+__all__ = ["DEFAULT_ENDPOINT", "Session", "check_endpoint", "open_client", "open_router"]
+
+DEFAULT_ENDPOINT: Final = "tcp/127.0.0.1:7447"
+CONNECT_TIMEOUT_S: Final = 2.0
+"""How long opening waits for a router by default; it tries again and again within this time."""
+_ENDPOINT: Final = re.compile(
+    r"(?P<protocol>tcp|tls|quic|udp|ws)/(?P<host>\[[0-9A-Fa-f:.]+\]|[^\s:/\[\]]+):(?P<port>\d{1,5})"
+)
+_COMMON: Final[dict[str, Any]] = {
+    "scouting/multicast/enabled": False,
+    "scouting/gossip/enabled": False,
+    # Plain bytes: implicit shared memory leaks segments of killed processes, and serves messages up to 16 MB only.
+    "transport/shared_memory/enabled": False,
+    # A receiver that stalls longer than this loses the transport, and with it what was in flight (5 s by default).
+    "transport/link/tx/queue/congestion_control/block/wait_before_close": 10_000_000,
+    "transport/link/rx/buffer_size": 4 * 1024 * 1024,
+    "transport/link/rx/max_message_size": 128 * 1024 * 1024,
+}
+_RETRY: Final = {"period_init_ms": 200, "period_max_ms": 2000, "period_increase_factor": 2}
+
+
+def check_endpoint(endpoint: str) -> str:
+    """Return the endpoint when it is well formed.
+
+    Args:
+        endpoint: ``protocol/host:port``, for example ``tcp/127.0.0.1:7447``.
+
+    Raises:
+        InvalidValueError: It is not.
+    """
+    match = _ENDPOINT.fullmatch(endpoint)
+    if match is None or not 1 <= int(match["port"]) <= 65535:  # noqa: PLR2004 - the range of ports
+        message = (
+            f"'{endpoint}' is not an endpoint: write protocol/host:port, for example {DEFAULT_ENDPOINT} "
+            "(protocols: tcp, tls, quic, udp, ws)."
+        )
+        raise InvalidValueError(message)
+    return endpoint
+
+
+def open_router(listen: str) -> Session:
+    """Open a session that is a router: others connect to it. Use it in a ``with`` statement.
+
+    Args:
+        listen: Endpoint to listen at.
+
+    Raises:
+        InvalidValueError: The endpoint is malformed.
+        ConnectionFailedError: The endpoint is in use or does not belong to this machine.
+    """
+    settings = {
+        "mode": "router",
+        "listen/endpoints": [check_endpoint(listen)],
+        "listen/exit_on_failure": True,
+        "listen/timeout_ms": 0,
+    }
+    try:
+        return zenoh.open(_config(settings))
+    except zenoh.ZError as error:
+        reason = "it is in use" if "in use" in str(error) else "the address does not belong to this machine"
+        message = f"Cannot listen at {listen}: {reason}; choose another endpoint with --listen."
+        raise ConnectionFailedError(message) from error
+
+
+def open_client(connect: str, timeout_s: float = CONNECT_TIMEOUT_S) -> Session:
+    """Open a session as a client of a router. Use it in a ``with`` statement.
+
+    Once open it survives the router: it reconnects by itself.
+
+    Args:
+        connect: Endpoint of the router or of a learner.
+        timeout_s: How long to wait for the router, seconds.
+
+    Raises:
+        InvalidValueError: The endpoint is malformed.
+        ConnectionFailedError: No router answers in time.
+    """
+    settings = {
+        "mode": "client",
+        "connect/endpoints": [check_endpoint(connect)],
+        "connect/timeout_ms": round(timeout_s * 1000),
+        "connect/retry": _RETRY,
+    }
+    try:
+        return zenoh.open(_config(settings))
+    except zenoh.ZError as error:
+        message = (
+            f"No learner or router answers at {connect}; "
+            "start one with `hoz-dist learner --listen ...` or check the address."
+        )
+        raise ConnectionFailedError(message) from error
+
+
+def _config(settings: dict[str, Any]) -> zenoh.Config:
+    config = zenoh.Config()
+    for path, value in (_COMMON | settings).items():
+        config.insert_json5(path, json.dumps(value))
+    return config

@@ -1,0 +1,56 @@
+"""Waiting that can be stopped, and retries that spread out."""
+
+import random
+import threading
+import time
+from typing import Final
+
+FIRST_PAUSE_S: Final = 0.05
+LONGEST_PAUSE_S: Final = 2.0
+
+
+class StoppedError(Exception):
+    """The process was told to stop while it waited; not a failure."""
+
+
+class Deadline:
+    """A moment until which something may take.
+
+    Args:
+        seconds: From now; None for no end.
+    """
+
+    def __init__(self, seconds: float | None) -> None:
+        self._end = None if seconds is None else time.monotonic() + seconds
+
+    @property
+    def passed(self) -> bool:
+        """Whether it is over."""
+        return self._end is not None and time.monotonic() >= self._end
+
+    def within(self, seconds: float) -> float:
+        """Return the time that is left, but not more than ``seconds``; never negative."""
+        return seconds if self._end is None else max(0.0, min(seconds, self._end - time.monotonic()))
+
+
+class Backoff:
+    """Pauses between retries: twice as long each time, each of a random length up to that.
+
+    Without the randomness, actors that lost the learner together would all come back at the same moment, every time.
+    """
+
+    def __init__(self, stop: threading.Event) -> None:
+        self._stop = stop
+        self._random = random.Random()
+        self._longest = FIRST_PAUSE_S
+
+    def pause(self, deadline: Deadline) -> None:
+        """Wait until the next try.
+
+        Raises:
+            StoppedError: The stop event was set.
+        """
+        length = self._random.uniform(self._longest / 2, self._longest)
+        self._longest = min(2 * self._longest, LONGEST_PAUSE_S)
+        if self._stop.wait(deadline.within(length)):
+            raise StoppedError
