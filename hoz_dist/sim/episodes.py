@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoz_dist.errors import InvalidValueError
-from hoz_dist.nav.categories import scene_index
+from hoz_dist.nav.categories import TARGETS, scene_index
 from hoz_dist.nav.episode import Episode
 from hoz_dist.nav.pose import PITCHES
 from hoz_dist.sim.room_views import RoomViews
@@ -55,18 +55,27 @@ class EpisodeSampler:
         self._rooms.append(views)
         self._starts.append(starts)
 
-    def sample(self, rng: np.random.Generator) -> tuple[int, Episode]:
+    def sample(self, rng: np.random.Generator, target: int | None = None) -> tuple[int, Episode]:
         """Draw an episode.
 
         Args:
             rng: Source of the three draws.
+            target: The target category if it is not to be drawn.
 
         Returns:
             The number of the room, in the order in which rooms were added, and the episode.
+
+        Raises:
+            InvalidValueError: The room that was drawn has no episode with that target.
         """
         number = int(rng.integers(len(self._rooms)))
         views, starts = self._rooms[number], self._starts[number]
-        target = list(starts)[rng.integers(len(starts))]
+        if target is None:
+            target = list(starts)[rng.integers(len(starts))]
+        elif target not in starts:
+            held = ", ".join(TARGETS[known] for known in starts)
+            message = f"Room {views.room} has no {TARGETS[target]} to search for; it has {held}."
+            raise InvalidValueError(message)
         valid = starts[target]
         start = int(valid[rng.integers(len(valid))])
         return number, Episode(views.room, start, target, int(views.optimal[start, target]))

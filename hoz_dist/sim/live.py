@@ -11,14 +11,13 @@ from numpy.typing import NDArray
 from hoz_dist.nav.encoder import VisualEncoder
 from hoz_dist.nav.rooms import RoomId
 from hoz_dist.sim.appearance import appearance
-from hoz_dist.sim.camera import Camera
 from hoz_dist.sim.catalogue import load_room
 from hoz_dist.sim.detections import Detector
+from hoz_dist.sim.painter import Painter
 from hoz_dist.sim.pose_graph import PoseGraph
 from hoz_dist.sim.room import Room
 from hoz_dist.sim.room_views import RoomViews
 from hoz_dist.sim.view_source import Sight
-from hoz_dist.sim.world import World
 
 REMEMBERED_VIEWS: Final = 8192
 """How many of the latest views `recall` can give without rendering: a rollout of 64 steps of 128 episodes."""
@@ -29,7 +28,7 @@ class _LiveRoom(NamedTuple):
 
     first_view: int
     graph: PoseGraph
-    camera: Camera
+    painter: Painter
     detector: Detector
 
 
@@ -76,14 +75,14 @@ class LiveViews:
     def close(self) -> None:
         """End the PyBullet worlds; closing twice does nothing."""
         for room in self._rooms:
-            room.camera.world.close()
+            room.painter.close()
         self._rooms.clear()
 
     def add_room(self, views: RoomViews) -> None:
         """Append a room and load it into a world of its own."""
         content = self._load_room(views.room)
-        camera = Camera(World(content), self._size)
-        self._rooms.append(_LiveRoom(self._views, views.graph, camera, Detector(content)))
+        painter = Painter(content, self._size)
+        self._rooms.append(_LiveRoom(self._views, views.graph, painter, Detector(content)))
         self._views += views.graph.views
 
     def look(self, views: NDArray[np.int64]) -> Sight:
@@ -112,12 +111,10 @@ class LiveViews:
     def _render(self, view: int) -> None:
         """Render one view and remember what it shows, as the latest."""
         room = next(room for room in reversed(self._rooms) if room.first_view <= view)
-        pose = room.graph.pose(view - room.first_view)
-        frame = room.camera.render(pose)
-        # Stored depths are half precision; the encoder gets the same here.
-        depth = frame.depth[None].astype(np.float16).astype(np.float32)
-        features = self._encoder.encode(frame.rgb[None], depth)
-        found = room.detector.detect(frame.segmentation[None], np.array([[pose.x, pose.z]]))
+        local = np.array([view - room.first_view])
+        frames = room.painter.paint(room.graph, local.tolist())
+        features = self._encoder.encode(frames.rgb, frames.depth.astype(np.float32))
+        found = room.detector.detect(frames.segmentation, room.graph.places(local))
         looks = appearance(features, found.detections)
         self._seen[view] = _Seen(features[0], found.detections[0], looks[0], found.success[0])
         self._seen.move_to_end(view)

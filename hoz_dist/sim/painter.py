@@ -1,11 +1,10 @@
 """Renders a room's pictures, starting PyBullet only when the first one is asked for."""
 
+from collections.abc import Sequence
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
-import numpy as np
-
-from hoz_dist.sim.pose_graph import VIEWS_PER_POSITION, PoseGraph, build_pose_graph
+from hoz_dist.sim.pose_graph import PoseGraph, build_pose_graph
 from hoz_dist.sim.room import Room
 from hoz_dist.sim.view_folder import Frames
 
@@ -34,14 +33,33 @@ class Painter:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """End the PyBullet world, if there is one."""
+        """End the PyBullet world."""
+        self.close()
+
+    def close(self) -> None:
+        """End the PyBullet world, if there is one; closing twice does nothing."""
         if self._camera is not None:
             self._camera.world.close()
             self._camera = None
 
-    @property
-    def camera(self) -> "Camera":
-        """A camera in the room."""
+    def pose_graph(self) -> PoseGraph:
+        """Find the room's pose graph."""
+        return build_pose_graph(self._eye().world)
+
+    def paint(self, graph: PoseGraph, views: Sequence[int]) -> Frames:
+        """Render M views.
+
+        Args:
+            graph: The room's pose graph.
+            views: The views, [M].
+        """
+        frames = Frames.empty(len(views), self._size)
+        for row, view in enumerate(views):
+            frames.rgb[row], frames.depth[row], frames.segmentation[row] = self._eye().render(graph.pose(view))
+        return frames
+
+    def _eye(self) -> "Camera":
+        """Return a camera in the room."""
         if self._camera is None:
             # PyBullet is not needed where a room's views are complete, and takes time to load.
             from hoz_dist.sim.camera import Camera  # noqa: PLC0415
@@ -49,17 +67,3 @@ class Painter:
 
             self._camera = Camera(World(self._room), self._size)
         return self._camera
-
-    def pose_graph(self) -> PoseGraph:
-        """Find the room's pose graph."""
-        return build_pose_graph(self.camera.world)
-
-    def paint(self, graph: PoseGraph, position: int) -> Frames:
-        """Render the 16 views of a position."""
-        camera, size = self.camera, self._size
-        rgb = np.empty((VIEWS_PER_POSITION, size, size, 3), dtype=np.uint8)
-        depth = np.empty((VIEWS_PER_POSITION, size, size), dtype=np.float16)
-        segmentation = np.empty((VIEWS_PER_POSITION, size, size), dtype=np.uint8)
-        for row in range(VIEWS_PER_POSITION):
-            rgb[row], depth[row], segmentation[row] = camera.render(graph.pose(position * VIEWS_PER_POSITION + row))
-        return Frames(rgb, depth, segmentation)

@@ -41,6 +41,10 @@ class PoseGraph:
         """Index into `PITCHES` of every view, [V]."""
         return np.arange(self.views) % len(PITCHES)
 
+    def places(self, views: NDArray[np.integer]) -> NDArray[np.float64]:
+        """Return where the camera stands at views [M]: (x, z) in metres, [M, 2]."""
+        return np.asarray(self.positions[views // VIEWS_PER_POSITION] * GRID_M)
+
     @cached_property
     def _position_index(self) -> dict[tuple[int, int], int]:
         return {(int(x), int(z)): index for index, (x, z) in enumerate(self.positions)}

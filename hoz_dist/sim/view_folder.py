@@ -43,6 +43,11 @@ class Frames(NamedTuple):
     segmentation: NDArray[np.uint8]
     """Index of the room's item plus 1, 0 where there is nothing, [M, S, S]."""
 
+    @classmethod
+    def empty(cls, count: int, size: int) -> "Frames":
+        """Make room for ``count`` pictures of side ``size``."""
+        return cls(**{name: np.empty((count, *shape), _DTYPES[name]) for name, shape in _picture_shapes(size).items()})
+
 
 class ViewFolder:
     """One room's folder, opened; reading needs no write access."""
@@ -52,8 +57,7 @@ class ViewFolder:
         self.path = path
         self.graph = graph
         self._frames = frames
-        self._checksum_map = checksums
-        self._checksums = np.array(checksums)
+        self._checksums = checksums
 
     @classmethod
     def open(cls, path: Path, size: int) -> Self:
@@ -125,9 +129,8 @@ class ViewFolder:
         """
         for name, new in frames._asdict().items():
             _overwrite(self._frames[name], position * new.nbytes, new)
-        self._checksums[position] = _frames_digest(frames)
-        checksum = self._checksums[position : position + 1]
-        _overwrite(self._checksum_map, position * checksum.nbytes, checksum)
+        checksum = np.array([_frames_digest(frames)], dtype=np.uint64)
+        _overwrite(self._checksums, position * checksum.nbytes, checksum)
 
     def load_derived(self, name: str) -> dict[str, _Array] | None:
         """Return the arrays derived under a name, memory-mapped, or None when they are not there or damaged."""

@@ -24,7 +24,6 @@ from numpy.typing import NDArray
 
 from hoz_dist.errors import DamagedFileError, InvalidValueError
 from hoz_dist.nav.encoder import VisualEncoder
-from hoz_dist.nav.pose import GRID_M
 from hoz_dist.nav.rooms import RoomId
 from hoz_dist.sim.appearance import appearance
 from hoz_dist.sim.catalogue import load_room
@@ -55,19 +54,20 @@ class ViewStore:
 
     def __init__(
         self,
-        cache: Path | None = None,
+        folder: Path | None = None,
         picture_size: int = DEFAULT_PICTURE_SIZE,
         rooms: Callable[[RoomId], Room] = load_room,
     ) -> None:
         """Use a cache folder, which is made when something is first stored in it.
 
         Args:
-            cache: The folder; `default_cache` if None.
+            folder: The cache folder; `default_cache` if None.
             picture_size: S, side of the square pictures in pixels.
             rooms: Gives the content of a room; the catalogue by default.
         """
-        self._load_room = rooms
-        self._cache = default_cache() if cache is None else cache
+        self._load_room = cache(rooms)
+        self._opened: dict[RoomId, ViewFolder] = {}
+        self._cache = default_cache() if folder is None else folder
         self._size = picture_size
 
     def open(self, room: RoomId, encoder: VisualEncoder, progress: Progress | None = None) -> RoomViews:
@@ -111,13 +111,13 @@ class ViewStore:
         Raises:
             InvalidValueError: Something is missing and the cache cannot be written.
         """
-        folder, content = self._folder(room)
+        folder = self._folder(room)
         chosen = np.arange(folder.graph.views) if views is None else np.asarray(views)
         position_of, row = np.divmod(chosen, VIEWS_PER_POSITION)
         positions, chunk_of = np.unique(position_of, return_inverse=True)
         chunks = [folder.read(position) for position in positions.tolist()]
         if None in chunks:
-            with self._writing(folder.path), Painter(content, self._size) as painter:
+            with self._writing(folder.path), Painter(self._load_room(room), self._size) as painter:
                 chunks = [_chunk(folder, painter, position) for position in positions.tolist()]
         frames = [chunk for chunk in chunks if chunk is not None]
         return Frames(
@@ -133,17 +133,19 @@ class ViewStore:
         Raises:
             InvalidValueError: The cache lacks it and cannot be written.
         """
-        return self._folder(room)[0].graph
+        return self._folder(room).graph
 
-    def _folder(self, room: RoomId) -> tuple[ViewFolder, Room]:
-        """Open a room's folder, or make it."""
-        content = self._load_room(room)
-        path = self._path(content)
-        try:
-            return ViewFolder.open(path, self._size), content
-        except DamagedFileError:
-            with self._writing(path), Painter(content, self._size) as painter:
-                return self._open_or_create(path, painter), content
+    def _folder(self, room: RoomId) -> ViewFolder:
+        """Return a room's folder, opened or made at the first call."""
+        if room not in self._opened:
+            content = self._load_room(room)
+            path = self._path(content)
+            try:
+                self._opened[room] = ViewFolder.open(path, self._size)
+            except DamagedFileError:
+                with self._writing(path), Painter(content, self._size) as painter:
+                    self._opened[room] = self._open_or_create(path, painter)
+        return self._opened[room]
 
     def _open_or_create(self, path: Path, painter: Painter) -> ViewFolder:
         """Open a room's folder, or make it; the caller holds the lock."""
@@ -177,7 +179,8 @@ def _chunk(folder: ViewFolder, painter: Painter, position: int) -> Frames:
     stored = folder.read(position)
     if stored is not None:
         return stored
-    frames = painter.paint(folder.graph, position)
+    start = position * VIEWS_PER_POSITION
+    frames = painter.paint(folder.graph, range(start, start + VIEWS_PER_POSITION))
     folder.write(position, frames)
     return frames
 
@@ -188,16 +191,17 @@ def _derive(
     """Compute the arrays of `RoomViews` from all pictures of a room, position by position."""
     graph, detector = folder.graph, Detector(room)
     pieces: dict[str, list[NDArray[Any]]] = {"features": [], "detections": [], "appearance": [], "success": []}
-    for position, cell in enumerate(graph.positions):
+    for position in range(len(graph.positions)):
+        stop = (position + 1) * VIEWS_PER_POSITION
         frames = _chunk(folder, painter, position)
         features = encoder.encode(frames.rgb, frames.depth.astype(np.float32))
-        found = detector.detect(frames.segmentation, np.tile(cell * GRID_M, (VIEWS_PER_POSITION, 1)))
+        found = detector.detect(frames.segmentation, graph.places(np.arange(stop - VIEWS_PER_POSITION, stop)))
         pieces["features"].append(features)
         pieces["detections"].append(found.detections)
         pieces["appearance"].append(appearance(features, found.detections))
         pieces["success"].append(found.success)
         if progress is not None:
-            progress((position + 1) * VIEWS_PER_POSITION, graph.views)
+            progress(stop, graph.views)
     arrays = {name: np.concatenate(chunks) for name, chunks in pieces.items()}
     arrays["optimal"] = np.stack([graph.distances_to(goal) for goal in arrays["success"].T], axis=1)
     return arrays
