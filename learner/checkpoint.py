@@ -1,0 +1,224 @@
+"""Checkpoints: one safetensors file each, written atomically, with a digest that tells damage.
+
+The tensors are ``parameters``, ``adam.first_moment``, ``adam.second_moment`` and, per known room,
+``rooms/kitchen/3/nodes`` and ``.../edges``. Everything else is JSON in the file's metadata under ``hoz``; ``digest`` is
+XXH3-128 over that JSON and all tensors. Nothing in a checkpoint is ever executed.
+"""
+
+import json
+import logging
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import xxhash
+from numpy.typing import NDArray
+from safetensors import SafetensorError, safe_open
+from safetensors.numpy import save_file
+
+from hoz_dist.config import RunConfig
+from hoz_dist.errors import DamagedFileError, HozError, InvalidValueError, NotFoundError
+from hoz_dist.graph.room_graph import RoomGraph
+from hoz_dist.graph.scene_graph import SceneGraph, merge_rooms
+from learner.files import TEMPORARY_SUFFIX, replace_file
+from learner.optimizer import AdamState, Vector
+
+FORMAT: Final = 1
+"""Version of the format; a file of another version is refused by name."""
+FOLDER: Final = "checkpoints"
+"""Where a run folder keeps them."""
+SUFFIX: Final = ".safetensors"
+KEPT_SUFFIX: Final = ".keep"
+"""An empty file of this suffix beside a checkpoint says that it is never deleted."""
+NEWEST_KEPT: Final = 3
+
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Checkpoint:
+    """All that a run needs to go on, and an evaluation to begin."""
+
+    config: RunConfig
+    epoch: int
+    version: int
+    """Version of the parameters: number of updates applied in all epochs."""
+    frames: int
+    episodes: int
+    seconds: float
+    """Training time so far."""
+    parameters: Vector
+    """[P]."""
+    adam: AdamState
+    rooms: tuple[RoomGraph, ...]
+    """The known room graphs."""
+    graph_versions: Mapping[str, int]
+    """Version of each scene graph."""
+    recent: tuple[tuple[str, bool], ...]
+    """(scene, success) of the last episodes."""
+    seen: list[list[object]]
+    """The table that tells repeated pushes."""
+
+    def scene_graphs(self) -> dict[str, SceneGraph]:
+        """Return the scene graphs, rebuilt from the room graphs."""
+        scenes: dict[str, list[RoomGraph]] = {}
+        for room in self.rooms:
+            scenes.setdefault(room.room.partition("/")[0], []).append(room)
+        return {scene: merge_rooms(scene, rooms, self.graph_versions[scene]) for scene, rooms in scenes.items()}
+
+
+def save_checkpoint(folder: Path, checkpoint: Checkpoint, *, keep: bool = False) -> Path:
+    """Write a checkpoint atomically, then delete all but the newest `NEWEST_KEPT` and those to keep.
+
+    Args:
+        folder: The folder of checkpoints; made when it is not there.
+        checkpoint: What to write.
+        keep: Never delete this one to make room for newer ones.
+
+    Returns:
+        The file, named by the version.
+
+    Raises:
+        OSError: It could not be written; older checkpoints are untouched.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    tensors = _tensors_of(checkpoint)
+    text = json.dumps(_values_of(checkpoint), sort_keys=True)
+    metadata = {"hoz": text, "digest": _digest(text, tensors)}
+    path = folder / f"{checkpoint.version:09d}{SUFFIX}"
+    try:
+        replace_file(path, lambda temporary: save_file(tensors, temporary, metadata))
+    except SafetensorError as error:
+        message = f"cannot write the checkpoint '{path}': {error}"
+        raise OSError(message) from error
+    if keep:
+        path.with_suffix(KEPT_SUFFIX).touch()
+    _prune(folder, path)
+    return path
+
+
+def load_checkpoint(path: Path) -> Checkpoint:
+    """Read a checkpoint.
+
+    Args:
+        path: A checkpoint; or a run folder, for its newest checkpoint that can be read, with warnings for damaged ones.
+
+    Raises:
+        NotFoundError: There is no such file, or no checkpoint in the folder.
+        DamagedFileError: The file, or every checkpoint of the folder, is damaged or something else.
+        InvalidValueError: The checkpoint is of another version of the format.
+    """
+    if not path.is_dir():
+        return _load_file(path)
+    folder = path / FOLDER if (path / FOLDER).is_dir() else path
+    files = checkpoint_files(folder)
+    if not files:
+        message = f"There is no checkpoint in '{path}'; give a checkpoint file or the folder of a run that saved one."
+        raise NotFoundError(message)
+    for file in files:
+        try:
+            return _load_file(file)
+        except HozError as error:
+            _log.warning("%s", error)
+    message = f"None of the {len(files)} checkpoints in '{folder}' can be read; the newest is '{files[0].name}'."
+    raise DamagedFileError(message)
+
+
+def checkpoint_files(folder: Path) -> list[Path]:
+    """Return the checkpoints of a folder, the newest first."""
+    return sorted((file for file in folder.glob(f"*{SUFFIX}") if file.stem.isdigit()), reverse=True)
+
+
+def _prune(folder: Path, newest: Path) -> None:
+    """Delete what is too old, and what a killed process left half-written."""
+    for left_over in folder.glob(f"*{TEMPORARY_SUFFIX}"):
+        left_over.unlink(missing_ok=True)
+    droppable = [file for file in checkpoint_files(folder) if not file.with_suffix(KEPT_SUFFIX).exists()]
+    for file in droppable[NEWEST_KEPT:]:
+        # After a damaged checkpoint of a higher version, the one just written is not the first of the list.
+        if file != newest:
+            file.unlink(missing_ok=True)
+
+
+def _tensors_of(checkpoint: Checkpoint) -> dict[str, NDArray[Any]]:
+    tensors: dict[str, NDArray[Any]] = {
+        "parameters": checkpoint.parameters,
+        "adam.first_moment": checkpoint.adam.first_moment,
+        "adam.second_moment": checkpoint.adam.second_moment,
+    }
+    for room in checkpoint.rooms:
+        tensors[f"rooms/{room.room}/nodes"] = room.nodes
+        tensors[f"rooms/{room.room}/edges"] = room.edges
+    # safetensors writes the memory as it lies, so it must lie in order.
+    return {name: np.ascontiguousarray(tensor) for name, tensor in tensors.items()}
+
+
+def _values_of(checkpoint: Checkpoint) -> dict[str, object]:
+    return {
+        "format": FORMAT,
+        "config": checkpoint.config.to_json(),
+        "epoch": checkpoint.epoch,
+        "version": checkpoint.version,
+        "frames": checkpoint.frames,
+        "episodes": checkpoint.episodes,
+        "seconds": checkpoint.seconds,
+        "adam_steps": checkpoint.adam.steps,
+        "rooms": [[room.room, room.digest] for room in checkpoint.rooms],
+        "graph_versions": dict(checkpoint.graph_versions),
+        "recent": [[scene, success] for scene, success in checkpoint.recent],
+        "seen": checkpoint.seen,
+    }
+
+
+def _digest(text: str, tensors: Mapping[str, NDArray[Any]]) -> str:
+    digest = xxhash.xxh3_128(text.encode())
+    for name in sorted(tensors):
+        tensor = tensors[name]
+        digest.update(f"{name} {tensor.dtype.str} {tensor.shape}".encode())
+        digest.update(np.ascontiguousarray(tensor).data)
+    return digest.hexdigest()
+
+
+def _load_file(path: Path) -> Checkpoint:
+    if not path.is_file():
+        message = f"There is no checkpoint '{path}'; give a checkpoint file or the folder of a run."
+        raise NotFoundError(message)
+    try:
+        with safe_open(path, framework="np") as file:
+            metadata = file.metadata() or {}
+            tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 - not a mapping
+        text = metadata["hoz"]
+        if metadata["digest"] != _digest(text, tensors):
+            message = "the digest does not match"
+            raise ValueError(message)  # noqa: TRY301 - one handler for all kinds of damage
+        values = json.loads(text)
+    except (SafetensorError, OSError, ValueError, KeyError) as error:
+        message = f"'{path}' is damaged or not a checkpoint of hoz-dist ({error}); use another checkpoint of the run."
+        raise DamagedFileError(message) from error
+    if values["format"] != FORMAT:
+        message = f"'{path}' has checkpoint format {values['format']}; this version of hoz-dist reads format {FORMAT}."
+        raise InvalidValueError(message)
+    return _checkpoint_of(values, tensors)
+
+
+def _checkpoint_of(values: Mapping[str, Any], tensors: Mapping[str, NDArray[Any]]) -> Checkpoint:
+    """Put a checkpoint together; the digest has vouched for the parts."""
+    return Checkpoint(
+        config=RunConfig.from_json(values["config"]),
+        epoch=values["epoch"],
+        version=values["version"],
+        frames=values["frames"],
+        episodes=values["episodes"],
+        seconds=values["seconds"],
+        parameters=tensors["parameters"],
+        adam=AdamState(values["adam_steps"], tensors["adam.first_moment"], tensors["adam.second_moment"]),
+        rooms=tuple(
+            RoomGraph(room, digest, tensors[f"rooms/{room}/nodes"], tensors[f"rooms/{room}/edges"])
+            for room, digest in values["rooms"]
+        ),
+        graph_versions=values["graph_versions"],
+        recent=tuple((scene, success) for scene, success in values["recent"]),
+        seen=values["seen"],
+    )

@@ -1,0 +1,320 @@
+"""What the learner decides: events in, effects out. No input or output, no clock, no threads.
+
+    core = LearnerCore(config, initial_parameters(config), epoch=1)
+    for effect in core.handle(GradientReceived(request=7, push=push), now=time.monotonic()):
+        ...  # carried out by `learner.service`
+
+Gradients are applied as they arrive. The parameter version counts the updates; a gradient's lag is how many versions
+the parameters went on since the version that it was computed on.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, Final
+
+from hoz_dist.config import RunConfig
+from hoz_dist.errors import InvalidValueError
+from hoz_dist.graph.room_graph import RoomGraph
+from hoz_dist.nav.categories import TARGETS
+from hoz_dist.wire.messages import Accepted, Busy, GradientPush, Refused, RoomGraphPush
+from hoz_dist.wire.rejection import Reason, RejectedError
+from learner.checkpoint import Checkpoint
+from learner.deduplication import SeenPushes, Sender
+from learner.events import (
+    Effect,
+    EpisodesReceived,
+    Event,
+    Finish,
+    GradientReceived,
+    PublishGraph,
+    PublishParameters,
+    RecordUpdate,
+    Reply,
+    RoomGraphReceived,
+    SaveCheckpoint,
+    Tick,
+)
+from learner.graph_store import GraphStore
+from learner.optimizer import FlatAdam, Vector, gradient_norm, lag_weight
+from learner.replay import Schedule, UpdateRecord
+from learner.statistics import Statistics
+
+GRAPH_CHECKPOINT_SECONDS: Final = 2.0
+"""A new room graph is saved this soon: rooms are few, and each took an actor a whole exploration."""
+
+
+class LearnerCore:
+    """State of a run: parameters, graphs, counters.
+
+    Args:
+        config: The run's configuration.
+        parameters: Initial parameters, float32 [P].
+        epoch: Epoch of this learner.
+        checkpoint: Where to go on from, instead of the initial parameters.
+        room_digests: Digests of rooms that are known beforehand, by room name.
+        schedule: Recorded updates to repeat.
+        checkpoint_seconds: Time between checkpoints.
+
+    Raises:
+        InvalidValueError: The checkpoint's parameters do not fit the configuration's policy.
+    """
+
+    def __init__(
+        self,
+        config: RunConfig,
+        parameters: Vector,
+        *,
+        epoch: int = 1,
+        checkpoint: Checkpoint | None = None,
+        room_digests: Mapping[str, str] | None = None,
+        schedule: Schedule | None = None,
+        checkpoint_seconds: float = 30.0,
+    ) -> None:
+        self.config = config
+        self.epoch = epoch
+        self.version = 0
+        self.finished = False
+        self._optimizer = FlatAdam(parameters, config.learning_rate, config.gradient_norm)
+        self.graphs = GraphStore(config.zones, room_digests or {})
+        self.statistics = Statistics()
+        self._seen = SeenPushes()
+        self._schedule = schedule
+        self._checkpoint_seconds = checkpoint_seconds
+        self._checkpoint_due: float | None = None
+        """When to save; None while nothing changed."""
+        self._seconds_before = 0.0
+        """Training time of earlier epochs."""
+        self._began: float | None = None
+        """When training began in this epoch: with the first room graph or gradient."""
+        if checkpoint is not None:
+            self._resume(checkpoint, room_digests or {})
+
+    # --- what the shell reads ---
+
+    @property
+    def parameters(self) -> Vector:
+        """The parameters as they are now, [P]: a view that the next gradient changes."""
+        return self._optimizer.parameters
+
+    @property
+    def learning_rate(self) -> float:
+        """The learning rate of the last update."""
+        return self._optimizer.learning_rate
+
+    def seconds(self, now: float) -> float:
+        """Return the training time so far, in all epochs."""
+        return self._seconds_before + (now - self._began if self._began is not None else 0.0)
+
+    def progress(self, now: float) -> float | None:
+        """Return the share of the budget used, in [0, 1]; None without a budget."""
+        if self.config.frames is not None:
+            return min(self.statistics.frames / self.config.frames, 1.0)
+        if self.config.minutes is not None:
+            return min(self.seconds(now) / (60.0 * self.config.minutes), 1.0)
+        return None
+
+    def snapshot(self, now: float) -> Checkpoint:
+        """Return a copy of all that a run needs to go on."""
+        return Checkpoint(
+            config=self.config,
+            epoch=self.epoch,
+            version=self.version,
+            frames=self.statistics.frames,
+            episodes=self.statistics.episodes,
+            seconds=self.seconds(now),
+            parameters=self._optimizer.parameters.copy(),
+            adam=self._optimizer.state(),
+            rooms=tuple(self.graphs.rooms.values()),
+            graph_versions=dict(self.graphs.versions),
+            recent=tuple(self.statistics.recent),
+            seen=self._seen.rows(),
+        )
+
+    def status(self, now: float) -> dict[str, Any]:
+        """Return what ``hoz-dist status`` shows, less the processes and rejections, as JSON values."""
+        statistics, lag, progress = self.statistics, self.statistics.lag(), self.progress(now)
+        return {
+            "version": self.version,
+            "epoch": self.epoch,
+            "frames": statistics.frames,
+            "episodes": statistics.episodes,
+            "frames_per_second": round(statistics.frames_per_second(now), 1),
+            "success": statistics.success(),
+            "lag": {"min": lag.minimum, "mean": round(lag.mean, 2), "max": lag.maximum, "bound": self.config.max_lag},
+            "learning_rate": self.learning_rate,
+            "progress": progress,
+            "budget": {"minutes": self.config.minutes, "frames": self.config.frames},
+            "seconds": round(self.seconds(now), 1),
+            "seconds_left": self._seconds_left(now, progress),
+            "finished": self.finished,
+            "duplicates": statistics.duplicates,
+            "scenes": {
+                scene: {"version": graph.version, "rooms": list(graph.rooms)}
+                for scene, graph in self.graphs.scenes.items()
+            },
+            "replay": self._replay_status(),
+            "actors": {name: actor.summary(now) for name, actor in statistics.actors.items()},
+        }
+
+    # --- what the shell tells ---
+
+    def handle(self, event: Event, now: float) -> list[Effect]:
+        """Take an event in.
+
+        Args:
+            event: What happened.
+            now: Time in seconds, from any clock that never runs backwards.
+
+        Returns:
+            What to do, in this order.
+        """
+        match event:
+            case GradientReceived(request, push):
+                effects = self._gradient(request, push, now)
+            case EpisodesReceived():
+                effects = self._episodes(event, now)
+            case RoomGraphReceived(request, push):
+                effects = self._room_graph(request, push, now)
+            case Tick():
+                effects = iter(())
+        return [*effects, *self._housekeeping(now)]
+
+    def _gradient(self, request: int, push: GradientPush, now: float) -> Iterator[Effect]:
+        sender = Sender("gradient", push.actor, push.incarnation)
+        if (sender, push.sequence) in self._seen:
+            yield self._repeated(request)
+            return
+        refusal = self._refusal(push)
+        if refusal is not None:
+            yield self._refuse(request, *refusal)
+            return
+        if self._schedule is not None and self._schedule.turn(push.actor, push.sequence) == "later":
+            yield Reply(request, Busy())
+            return
+        yield from self._apply(sender, push, now)
+        yield PublishParameters()
+        yield Reply(request, self._accepted())
+
+    def _refusal(self, push: GradientPush) -> tuple[Reason, str] | None:
+        """Return why a gradient cannot be used, as reason and detail; None when it can.
+
+        Its entries are finite: a message with others cannot be made.
+        """
+        lag, size = self.version - push.version, self._optimizer.size
+        unknown = self._schedule is not None and self._schedule.turn(push.actor, push.sequence) == "never"
+        checks = (
+            (self.finished, Reason.STALE, "finished: the budget is used up"),
+            (push.epoch != self.epoch, Reason.EPOCH, f"computed in epoch {push.epoch}, now is {self.epoch}"),
+            (lag < 0, Reason.STALE, f"computed on version {push.version}, the newest is {self.version}"),
+            (lag > self.config.max_lag, Reason.STALE, f"{lag} versions behind, the bound is {self.config.max_lag}"),
+            (push.gradient.size != size, Reason.SHAPE, f"{push.gradient.size} entries for {size} parameters"),
+            (unknown, Reason.STALE, f"sequence {push.sequence} was not applied in the recorded run"),
+        )
+        return next(((reason, detail) for wrong, reason, detail in checks if wrong), None)
+
+    def _apply(self, sender: Sender, push: GradientPush, now: float) -> Iterator[Effect]:
+        lag = self.version - push.version
+        self._began = now if self._began is None else self._began
+        self._optimizer.set_progress(self.progress(now) or 0.0)
+        if self._schedule is not None:
+            self._optimizer.learning_rate = self._schedule.take(push.version)
+        self._optimizer.step(push.gradient, gradient_norm(push.gradient), lag_weight(lag))
+        self._seen.add(sender, push.sequence)
+        self.version += 1
+        self.statistics.applied(push.actor, push.frames, lag, now)
+        self._save_within(self._checkpoint_seconds, now)
+        yield RecordUpdate(
+            UpdateRecord(push.actor, push.incarnation, push.sequence, push.version, lag, self._optimizer.learning_rate)
+        )
+
+    def _episodes(self, event: EpisodesReceived, now: float) -> Iterator[Effect]:
+        push = event.push
+        sender = Sender("episodes", push.actor, push.incarnation)
+        if (sender, push.sequence) in self._seen:
+            yield self._repeated(event.request)
+            return
+        self._seen.add(sender, push.sequence)
+        actor = self.statistics.actor(push.actor, now)
+        for episode in push.episodes:
+            actor.rooms.add(str(episode.room))
+            self.statistics.finished(episode.room.scene, success=episode.success)
+        self._save_within(self._checkpoint_seconds, now)
+        yield Reply(event.request, self._accepted())
+
+    def _room_graph(self, request: int, push: RoomGraphPush, now: float) -> Iterator[Effect]:
+        sender = Sender("room", push.actor, push.incarnation)
+        if (sender, push.sequence) in self._seen:
+            yield self._repeated(request)
+            return
+        try:
+            if push.categories != TARGETS:
+                raise RejectedError(Reason.NAME, "the categories are not the run's")  # noqa: TRY301 - one handler
+            changed = self.graphs.add(RoomGraph(str(push.room), push.digest, push.nodes, push.edges))
+        except RejectedError as error:
+            yield self._refuse(request, error.reason, error.detail)
+            return
+        except InvalidValueError as error:
+            yield self._refuse(request, Reason.RANGE, str(error))
+            return
+        self._seen.add(sender, push.sequence)
+        self.statistics.actor(push.actor, now).rooms.add(str(push.room))
+        self._began = now if self._began is None else self._began
+        if changed:
+            self._save_within(min(GRAPH_CHECKPOINT_SECONDS, self._checkpoint_seconds), now)
+            yield PublishGraph(push.room)
+        yield Reply(request, self._accepted())
+
+    def _repeated(self, request: int) -> Reply:
+        self.statistics.duplicates += 1
+        return Reply(request, self._accepted())
+
+    @staticmethod
+    def _refuse(request: int, reason: Reason, detail: str) -> Reply:
+        return Reply(request, Refused(reason.value, detail))
+
+    def _accepted(self) -> Accepted:
+        return Accepted(self.epoch, self.version)
+
+    def _housekeeping(self, now: float) -> Sequence[Effect]:
+        """Finish when the budget is used up; save when it is time."""
+        repeated = self._schedule is not None and self._schedule.done
+        if not self.finished and (repeated or self.progress(now) == 1.0):
+            self.finished = True
+            self._checkpoint_due = None
+            return SaveCheckpoint(keep=True), Finish()
+        if self._checkpoint_due is not None and now >= self._checkpoint_due:
+            self._checkpoint_due = None
+            return (SaveCheckpoint(keep=False),)
+        return ()
+
+    def _save_within(self, seconds: float, now: float) -> None:
+        due = now + seconds
+        self._checkpoint_due = due if self._checkpoint_due is None else min(self._checkpoint_due, due)
+
+    def _seconds_left(self, now: float, progress: float | None) -> float | None:
+        """Return the time left of the budget; None without a budget, or when it cannot be told yet."""
+        if self.config.minutes is not None:
+            return round(max(60.0 * self.config.minutes - self.seconds(now), 0.0), 1)
+        rate = self.statistics.frames_per_second(now)
+        if progress is None or self.config.frames is None or rate <= 0.0:
+            return None
+        return round(max(self.config.frames - self.statistics.frames, 0) / rate, 1)
+
+    def _replay_status(self) -> dict[str, int] | None:
+        if self._schedule is None:
+            return None
+        return {"applied": self._schedule.applied, "total": self._schedule.total, "diverged": self._schedule.diverged}
+
+    def _resume(self, checkpoint: Checkpoint, room_digests: Mapping[str, str]) -> None:
+        if checkpoint.parameters.size != self._optimizer.size:
+            message = (
+                f"The checkpoint has {checkpoint.parameters.size} parameters, the policy of its configuration "
+                f"{self._optimizer.size}: it was written by another version of hoz-dist."
+            )
+            raise InvalidValueError(message)
+        self._optimizer = FlatAdam(checkpoint.parameters, self.config.learning_rate, self.config.gradient_norm)
+        self._optimizer.load_state(checkpoint.adam)
+        self.version = checkpoint.version
+        self.graphs = GraphStore(self.config.zones, room_digests, checkpoint.rooms, checkpoint.graph_versions)
+        self.statistics = Statistics(checkpoint.frames, checkpoint.episodes, checkpoint.recent)
+        self._seen = SeenPushes(checkpoint.seen)
+        self._seconds_before = checkpoint.seconds

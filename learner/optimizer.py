@@ -1,0 +1,123 @@
+"""Adam on one flat vector of parameters, with a learning rate that falls linearly over the budget."""
+
+from typing import Final, NamedTuple
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+Vector = NDArray[np.float32]
+"""All parameters of a policy, or as many gradients or moments, in one vector, float32 [P]."""
+
+BETAS: Final = (0.9, 0.999)
+EPSILON: Final = 1e-8
+NORM_TOLERANCE: Final = 1e-3
+"""Actors clip their gradients themselves; a norm that exceeds the bound by this share is their rounding."""
+
+
+class AdamState(NamedTuple):
+    """What Adam remembers between steps; together with the parameters all that a resumed run needs."""
+
+    steps: int
+    first_moment: Vector
+    """Running mean of the gradient, [P]."""
+    second_moment: Vector
+    """Running mean of the squared gradient, [P]."""
+
+
+def lag_weight(lag: int) -> float:
+    """Return the factor of a gradient that was computed ``lag`` versions ago, 1 / sqrt(1 + lag); exactly 1 at lag 0.
+
+    The factor scales the gradient, not the learning rate. Adam divides by the running magnitude of the gradients, so
+    only a gradient's weight relative to the others counts: actors that all lag alike train at the full learning rate,
+    and a straggler moves the parameters less than its fresher fellows. Dividing the learning rate by the lag, as in
+    staleness-aware SGD [Zhang et al. 2016], would slow down every run with many actors.
+    """
+    return float(1.0 / np.sqrt(1.0 + lag))
+
+
+def gradient_norm(gradient: Vector) -> float:
+    """Return the Euclidean norm of finite entries.
+
+    One pass in float32, about a tenth of the cost of the Adam step that follows. Entries beyond 1e19 overflow there and
+    take a second pass in float64.
+    """
+    with np.errstate(over="ignore", invalid="ignore"):
+        squared = float(np.dot(gradient, gradient))
+        if not np.isfinite(squared):
+            return float(np.linalg.norm(gradient.astype(np.float64)))
+    return float(np.sqrt(squared))
+
+
+class FlatAdam:
+    """Adam (fused: one pass over memory) that owns the parameters.
+
+    Args:
+        parameters: Initial parameters, float32 [P]; copied.
+        learning_rate: The learning rate at progress 0.
+        max_norm: Gradients are scaled down to this Euclidean norm before they are weighed.
+    """
+
+    def __init__(self, parameters: Vector, learning_rate: float, max_norm: float) -> None:
+        self.base_learning_rate = learning_rate
+        self.learning_rate = learning_rate
+        self.max_norm = max_norm
+        # The NumPy arrays and the tensors are two views of the same memory.
+        self._parameters = np.array(parameters, dtype=np.float32)
+        self._gradient = np.zeros_like(self._parameters)
+        self._tensor = torch.from_numpy(self._parameters)
+        self._tensor.grad = torch.from_numpy(self._gradient)
+        self._adam = torch.optim.Adam([self._tensor], lr=learning_rate, betas=BETAS, eps=EPSILON, fused=True)
+
+    @property
+    def size(self) -> int:
+        """P, the number of parameters."""
+        return self._parameters.size
+
+    @property
+    def parameters(self) -> Vector:
+        """The parameters as they are now, [P]: a view that the next step changes. Copy it to keep it."""
+        view = self._parameters.view()
+        view.flags.writeable = False
+        return view
+
+    def set_progress(self, progress: float) -> None:
+        """Set the learning rate to ``base * (1 - progress)``; progress is the share of the budget used."""
+        self.learning_rate = self.base_learning_rate * (1.0 - min(max(progress, 0.0), 1.0))
+
+    def step(self, gradient: Vector, norm: float, weight: float = 1.0, learning_rate: float | None = None) -> None:
+        """Apply one gradient.
+
+        Args:
+            gradient: [P], finite; left as it is, and may be read-only (the bytes of a message).
+            norm: Its `gradient_norm`.
+            weight: Its factor, see `lag_weight`.
+            learning_rate: Used instead of the scheduled one, to repeat a recorded run.
+        """
+        bounded = self.max_norm / norm if norm > self.max_norm * (1.0 + NORM_TOLERANCE) else 1.0
+        np.multiply(gradient, np.float32(bounded * weight), out=self._gradient)
+        self._adam.param_groups[0]["lr"] = self.learning_rate if learning_rate is None else learning_rate
+        self._adam.step()
+
+    def state(self) -> AdamState:
+        """Return a copy of the moments."""
+        state = self._adam.state.get(self._tensor)
+        if state is None:
+            return AdamState(0, np.zeros_like(self._parameters), np.zeros_like(self._parameters))
+        first, second = state["exp_avg"], state["exp_avg_sq"]
+        return AdamState(int(state["step"].item()), first.numpy().copy(), second.numpy().copy())
+
+    def load_state(self, state: AdamState) -> None:
+        """Continue from moments that `state` returned.
+
+        Raises:
+            ValueError: They belong to another number of parameters.
+        """
+        if not state.first_moment.size == state.second_moment.size == self.size:
+            message = f"moments of {state.first_moment.size} parameters do not fit {self.size} parameters"
+            raise ValueError(message)
+        self._adam.state[self._tensor] = {
+            "step": torch.tensor(float(state.steps), dtype=torch.float32),
+            "exp_avg": torch.from_numpy(np.array(state.first_moment, dtype=np.float32)),
+            "exp_avg_sq": torch.from_numpy(np.array(state.second_moment, dtype=np.float32)),
+        }

@@ -1,0 +1,118 @@
+"""The record of applied updates, and repeating a run in a recorded order.
+
+Two runs are identical only when the same gradients are applied in the same order with the same learning rates, which
+under asynchronous training depends on timing. So the learner writes each applied update to ``updates.jsonl``, and
+with ``--replay`` applies gradients in the order of such a file.
+"""
+
+import json
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Literal, NamedTuple
+
+from hoz_dist.errors import DamagedFileError, NotFoundError
+
+
+class UpdateRecord(NamedTuple):
+    """One applied update; line v of the file (from 0) made version v + 1 of the parameters."""
+
+    actor: str
+    incarnation: int
+    sequence: int
+    version: int
+    """The version that the gradient was computed on."""
+    lag: int
+    learning_rate: float
+
+    def to_line(self) -> str:
+        """Return the record as a line of JSON; the learning rate survives exactly."""
+        return json.dumps(self._asdict()) + "\n"
+
+    @classmethod
+    def from_line(cls, line: str) -> "UpdateRecord":
+        """Read a line that `to_line` returned.
+
+        Raises:
+            ValueError: It is something else.
+        """
+        match json.loads(line):
+            case {
+                "actor": str(actor),
+                "incarnation": int(incarnation),
+                "sequence": int(sequence),
+                "version": int(version),
+                "lag": int(lag),
+                "learning_rate": float(learning_rate),
+            }:
+                return cls(actor, incarnation, sequence, version, lag, learning_rate)
+        message = "not a record of an update"
+        raise ValueError(message)
+
+
+def read_updates(path: Path) -> list[UpdateRecord]:
+    """Read ``updates.jsonl``.
+
+    Raises:
+        NotFoundError: There is no such file.
+        DamagedFileError: It holds something else.
+    """
+    records: list[UpdateRecord] = []
+    try:
+        with path.open(encoding="utf-8") as file:
+            records.extend(map(UpdateRecord.from_line, file))
+    except OSError as error:
+        message = f"Cannot read the recorded updates '{path}' ({error.strerror}); give the updates.jsonl of a run."
+        raise NotFoundError(message) from error
+    except ValueError as error:
+        message = f"Line {len(records) + 1} of '{path}' is not a recorded update; give the updates.jsonl of a run."
+        raise DamagedFileError(message) from error
+    return records
+
+
+class Schedule:
+    """The recorded order in which gradients are to be applied.
+
+    Actors are matched by name and sequence number; their incarnations differ from run to run.
+    """
+
+    def __init__(self, records: Sequence[UpdateRecord]) -> None:
+        self._records = records
+        self._next = 0
+        self._left = Counter((record.actor, record.sequence) for record in records)
+        self.diverged = 0
+        """Gradients that were computed on another version than the recorded one: the run is not the recorded one."""
+
+    @property
+    def applied(self) -> int:
+        """Number of updates repeated so far."""
+        return self._next
+
+    @property
+    def total(self) -> int:
+        """Number of recorded updates."""
+        return len(self._records)
+
+    @property
+    def done(self) -> bool:
+        """Whether every recorded update was repeated."""
+        return self._next == len(self._records)
+
+    def turn(self, actor: str, sequence: int) -> Literal["now", "later", "never"]:
+        """Tell when a gradient is to be applied: never, when the recorded run did not apply it."""
+        if self._left[actor, sequence] == 0:
+            return "never"
+        record = self._records[self._next]
+        return "now" if (record.actor, record.sequence) == (actor, sequence) else "later"
+
+    def take(self, version: int) -> float:
+        """Go on to the next update and return the learning rate of the one that is applied now.
+
+        Args:
+            version: The version that the gradient was computed on.
+        """
+        record = self._records[self._next]
+        self._next += 1
+        self._left[record.actor, record.sequence] -= 1
+        self.diverged += version != record.version
+        return record.learning_rate

@@ -1,0 +1,87 @@
+"""Makes the messages, graphs and cores that the learner's tests work with."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hoz_dist.config import RunConfig
+from hoz_dist.graph.room_graph import RoomGraph
+from hoz_dist.nav.categories import TARGETS
+from hoz_dist.nav.episode import EpisodeResult
+from hoz_dist.nav.rooms import RoomId
+from hoz_dist.wire.messages import EpisodesPush, GradientPush, RoomGraphPush
+from learner.core import LearnerCore
+from learner.events import Effect, Event, GradientReceived, Reply
+
+SIZE = 11
+ZONES = 3
+CONFIG = RunConfig(zones=ZONES, learning_rate=0.01, max_lag=4)
+
+Float32 = NDArray[np.float32]
+
+
+def vector(seed: int, size: int = SIZE) -> Float32:
+    return np.random.default_rng(seed).normal(size=size).astype(np.float32)
+
+
+def gradient(
+    sequence: int,
+    *,
+    actor: str = "a",
+    incarnation: int = 1,
+    epoch: int = 1,
+    version: int = 0,
+    frames: int = 10,
+    values: Float32 | None = None,
+) -> GradientPush:
+    values = vector(sequence) if values is None else values
+    return GradientPush(
+        actor=actor,
+        incarnation=incarnation,
+        sequence=sequence,
+        epoch=epoch,
+        version=version,
+        frames=frames,
+        gradient=values,
+    )
+
+
+def episodes(sequence: int, *outcomes: tuple[str, bool]) -> EpisodesPush:
+    results = tuple(EpisodeResult(RoomId.parse(room), 0, success, 12, 6, True, 8) for room, success in outcomes)
+    return EpisodesPush(
+        actor="a", incarnation=1, sequence=sequence, frames=100, frames_per_second=50.0, lag=0.0, episodes=results
+    )
+
+
+def room_graph(room: str, seed: int = 0, *, digest: str = "d0", zones: int = ZONES) -> RoomGraph:
+    generator = np.random.default_rng(seed)
+    edges = generator.uniform(size=(zones, zones))
+    edges = (edges + edges.T) / 2
+    np.fill_diagonal(edges, 1.0)
+    return RoomGraph(room, digest, generator.uniform(size=(zones, len(TARGETS))), edges)
+
+
+def room_push(sequence: int, graph: RoomGraph, categories: tuple[str, ...] = TARGETS) -> RoomGraphPush:
+    return RoomGraphPush(
+        actor="a",
+        incarnation=1,
+        sequence=sequence,
+        room=RoomId.parse(graph.room),
+        digest=graph.digest,
+        categories=categories,
+        nodes=graph.nodes,
+        edges=graph.edges,
+    )
+
+
+def answer(core: LearnerCore, event: Event, now: float = 0.0) -> object:
+    """The answer to a push; exactly one is given to each."""
+    (reply,) = replies(core.handle(event, now))
+    return reply.answer
+
+
+def replies(effects: list[Effect]) -> list[Reply]:
+    return [effect for effect in effects if isinstance(effect, Reply)]
+
+
+def push(core: LearnerCore, *pushes: GradientPush, now: float = 0.0) -> list[object]:
+    return [answer(core, GradientReceived(request, item), now) for request, item in enumerate(pushes)]

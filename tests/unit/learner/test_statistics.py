@@ -1,0 +1,57 @@
+import pytest
+
+from learner.statistics import MAX_ACTORS, SUCCESS_WINDOW, LagSummary, Rate, Statistics
+
+
+def test_a_steady_rate_is_measured() -> None:
+    rate = Rate()
+    for second in range(100):
+        rate.add(1000.0 + second, 50)
+    assert rate.per_second(1100.0) == pytest.approx(50.0, rel=0.05)
+
+
+def test_a_rate_falls_to_zero_when_nothing_comes() -> None:
+    rate = Rate()
+    rate.add(5.0, 300)
+    assert rate.per_second(6.0) == 300.0
+    assert rate.per_second(15.0) == 30.0
+    assert rate.per_second(100.0) == 0.0
+
+
+def test_success_is_that_of_the_last_thousand_episodes() -> None:
+    statistics = Statistics()
+    for _ in range(500):
+        statistics.finished("kitchen", success=False)
+    for _ in range(SUCCESS_WINDOW - 250):
+        statistics.finished("bedroom", success=True)
+    success = statistics.success()
+    assert success == {"episodes": 1000, "overall": 0.75, "scenes": {"bedroom": 1.0, "kitchen": 0.0}}
+    assert statistics.episodes == 1250
+
+
+def test_no_episodes_have_no_success_rate() -> None:
+    assert Statistics().success() == {"episodes": 0, "overall": None, "scenes": {}}
+
+
+def test_lag_is_summed_up() -> None:
+    statistics = Statistics()
+    assert statistics.lag() == LagSummary(0, 0.0, 0)
+    for lag in (1, 3, 8):
+        statistics.applied("a", 20, lag, now=1.0)
+    assert statistics.lag() == LagSummary(1, 4.0, 8)
+    assert statistics.frames == 60
+    assert statistics.actors["a"].summary(now=3.5) == {
+        "rooms": [],
+        "frames": 60,
+        "frames_per_second": 24.0,
+        "lag": 4.0,
+        "last_seen_seconds": 2.5,
+    }
+
+
+def test_actors_are_forgotten_when_there_are_too_many() -> None:
+    statistics = Statistics()
+    for number in range(MAX_ACTORS + 1):
+        statistics.actor(f"a{number}", now=float(number))
+    assert len(statistics.actors) == MAX_ACTORS
+    assert "a0" not in statistics.actors
