@@ -20,6 +20,8 @@ from hoz_dist.sim.view_store import ViewStore
 
 SHEET_COLUMNS: Final = 8
 """Pictures of each room in a contact sheet."""
+_SHEET_GAP: Final = 2
+"""Pixels between pictures."""
 _POLL_S: Final = 0.2
 
 
@@ -72,7 +74,7 @@ def render_rooms(rooms: Sequence[RoomId], cache: Path, picture_size: int, jobs: 
 
 
 def write_contact_sheet(rooms: Iterable[RoomId], store: ViewStore, output: Path) -> None:
-    """Write a picture with one row for each room: views from positions all over it, looking ahead.
+    """Write a picture with one row for each room: from places all over it, the level view that shows most items.
 
     Args:
         rooms: The rooms.
@@ -89,10 +91,12 @@ def write_contact_sheet(rooms: Iterable[RoomId], store: ViewStore, output: Path)
     for room in rooms:
         graph = store.graph(room)
         places = graph.positions[np.linspace(0, len(graph.positions) - 1, SHEET_COLUMNS).astype(int)] * GRID_M
-        # A yaw for each place, three eighths of a turn apart, so that neighbouring pictures differ.
-        poses = [Pose(x, z, YAWS[3 * column % len(YAWS)], 0) for column, (x, z) in enumerate(places.tolist())]
-        pictures = store.frames(room, np.array([graph.view_of(pose) for pose in poses])).rgb
-        rows.append(np.concatenate(list(pictures), axis=1))
+        views = [graph.view_of(Pose(x, z, yaw, 0)) for x, z in places.tolist() for yaw in YAWS]
+        frames = store.frames(room, np.array(views))
+        items = np.array([np.unique(picture).size for picture in frames.segmentation]).reshape(-1, len(YAWS))
+        best = np.arange(len(items)) * len(YAWS) + items.argmax(axis=1)
+        gap = ((0, 0), (0, _SHEET_GAP), (0, _SHEET_GAP), (0, 0))
+        rows.append(np.concatenate(list(np.pad(frames.rgb[best], gap, constant_values=255)), axis=1))
     imsave(output, np.concatenate(rows, axis=0))
 
 
