@@ -6,7 +6,7 @@ from typing import Final
 
 import zenoh
 
-from hoz_dist.wire.messages import Accepted, Busy, Message, Push, Refused
+from hoz_dist.wire.messages import Push, PushReply, Refused
 from hoz_dist.wire.queryable import answer
 from hoz_dist.wire.rejection import Reason
 from hoz_dist.wire.rejections import Rejections
@@ -35,24 +35,15 @@ class Request:
         self._rejections = rejections
         self._lock = threading.Lock()
 
-    def accept(self, epoch: int, version: int) -> None:
-        """Say that the push counts, and which parameters are the newest."""
-        self._answer(Accepted(epoch, version))
-
-    def busy(self) -> None:
-        """Ask the actor to push again later."""
-        self._answer(Busy())
-
-    def refuse(self, reason: Reason, detail: str) -> None:
-        """Say that the push does not count; it is counted as a rejection, and logged."""
-        self._rejections.count(reason, detail, self.message.actor)
-        self._answer(Refused(reason.value, detail[:2048]))
-
-    def _answer(self, reply: Message) -> None:
+    def answer(self, reply: PushReply) -> None:
+        """Say what became of the push; a refusal is counted as a rejection, and logged."""
         with self._lock:
             query, self._query = self._query, None
-        if query is not None:
-            answer(query, self._key, reply)
+        if query is None:
+            return
+        if isinstance(reply, Refused) and reply.reason != Reason.FINISHED:
+            self._rejections.count(Reason(reply.reason), reply.detail, self.message.actor)
+        answer(query, self._key, reply)
 
 
 class Inbox:

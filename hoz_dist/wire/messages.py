@@ -22,6 +22,7 @@ MAX_PARAMETERS: Final = 30_000_000
 """Largest number of policy parameters; three times the paper's sizes, and within Zenoh's largest message."""
 MAX_ZONES: Final = 64
 MAX_EPISODES: Final = 4096
+_DIAGONAL_TOLERANCE: Final = 1e-6
 _SMALL: Final = 64 * 1024
 _GRAPH: Final = 1024 * 1024
 
@@ -376,9 +377,9 @@ class StatusReply(Message):
     Attributes:
         version: Version of the newest parameters.
         epoch: Epoch of the learner.
-        frames: Environment steps trained on so far.
         processes: Holders of a live token.
         rejected: Number of rejected messages by reason; reasons that never occurred are left out.
+        details: More for people, what JSON can hold; none of its names is one of the above.
     """
 
     KIND: ClassVar[str] = "status"
@@ -386,9 +387,9 @@ class StatusReply(Message):
 
     version: Annotated[int, Int()]
     epoch: Annotated[int, Int()]
-    frames: Annotated[int, Int()]
     processes: Annotated[tuple[ProcessStatus, ...], Many(Record(ProcessStatus), 4096)]
     rejected: Annotated[dict[str, int], Counts()]
+    details: Annotated[dict[str, Any], JsonObject()]
 
 
 def _check_graph(nodes: NDArray[np.float64], edges: NDArray[np.float64], categories: tuple[str, ...]) -> None:
@@ -399,3 +400,5 @@ def _check_graph(nodes: NDArray[np.float64], edges: NDArray[np.float64], categor
         raise RejectedError(Reason.SHAPE, detail)
     if len(set(categories)) != len(categories):
         raise RejectedError(Reason.NAME, "a category occurs twice")
+    if np.abs(np.diagonal(edges) - 1.0).max() > _DIAGONAL_TOLERANCE:
+        raise RejectedError(Reason.RANGE, "the edges are not 1 on the diagonal")

@@ -44,6 +44,8 @@ class Reason(StrEnum):
     """The room is not the one that its digest says."""
     SPLIT = "split"
     """The room is kept for validation or test."""
+    FINISHED = "finished"
+    """The run is over: its budget is used up. No fault of the message's, so it is not counted."""
     NOT_FOUND = "not_found"
     """What was asked for is not there yet."""
     INTERNAL = "internal"

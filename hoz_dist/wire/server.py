@@ -5,22 +5,25 @@ lets messages wait. Pushes are checked and then wait in one bounded queue for th
 spot from snapshots. Whatever is wrong with a message, the thread lives on and the sender gets one answer.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from types import TracebackType
 from typing import Self
 
 from zenoh import KeyExpr, Query, Session, ZBytes
 
 from hoz_dist.errors import HozError
+from hoz_dist.graph.room_graph import RoomGraph
+from hoz_dist.graph.scene_graph import SceneGraph
 from hoz_dist.wire.codec import checksum, decode, encode
+from hoz_dist.wire.graphs import room_graph_reply, scene_graph_reply
 from hoz_dist.wire.inbox import Inbox, Request
 from hoz_dist.wire.keys import Keys
-from hoz_dist.wire.messages import EpisodesPush, GradientPush, Message, Push, Refused, RoomGraphPush
+from hoz_dist.wire.messages import Busy, EpisodesPush, GradientPush, Message, Push, Refused, RoomGraphPush
 from hoz_dist.wire.publishing import NewestPublisher
 from hoz_dist.wire.queryable import answer, declare_queryable, refusal_of
 from hoz_dist.wire.rejection import Reason, RejectedError
 from hoz_dist.wire.rejections import Rejections
-from hoz_dist.wire.snapshots import GraphMessage, Snapshots
+from hoz_dist.wire.snapshots import GraphReply, Snapshots
 
 
 class Server:
@@ -51,19 +54,17 @@ class Server:
         }
         self._queryables = [declare_queryable(session, key, handle) for key, handle in handlers.items()]
 
-    def set_graphs(self, graphs: Mapping[str, GraphMessage]) -> None:
-        """Replace the graphs that are served, and publish those that changed.
-
-        Args:
-            graphs: Graphs by the name of their scene or room. A graph that did not change is the same object as before.
-        """
-        before = self.snapshots.graphs
-        self.snapshots.set_graphs(graphs)
-        for name, graph in graphs.items():
-            if before.get(name) is not graph:
-                if name not in self._publishers:
-                    self._publishers[name] = NewestPublisher(self._session, self._keys.graph(name))
-                self._publishers[name].publish(graph)
+    def put_graph(self, graph: SceneGraph | RoomGraph) -> None:
+        """Serve a graph instead of the one of the same scene or room so far, and publish it."""
+        if isinstance(graph, SceneGraph):
+            name: str = graph.scene
+            reply: GraphReply = scene_graph_reply(graph)
+        else:
+            name, reply = graph.room, room_graph_reply(graph)
+        self.snapshots.graphs = {**self.snapshots.graphs, name: reply}
+        if name not in self._publishers:
+            self._publishers[name] = NewestPublisher(self._session, self._keys.graph(name))
+        self._publishers[name].publish(reply)
 
     def close(self) -> None:
         """Stop serving; who asks from now on gets no answer."""
@@ -92,7 +93,7 @@ class Server:
             return
         request = Request(query, message, len(payload), self.rejections)
         if not self.inbox.offer(request):
-            request.busy()
+            request.answer(Busy())
 
     def _checked(self, key: str, payload: bytes, attachment: ZBytes | None, expected: type[Push]) -> Push:
         """Return the message of a push.

@@ -5,22 +5,18 @@ declares everything again by itself), retries from 200 ms to 2 s (the default ta
 """
 
 import json
-import re
 from typing import Any, Final
 
 import zenoh
 from zenoh import Session
 
-from hoz_dist.errors import ConnectionFailedError, InvalidValueError
+from hoz_dist.errors import ConnectionFailedError
+from hoz_dist.wire.endpoint import check_endpoint
 
-__all__ = ["DEFAULT_ENDPOINT", "Session", "check_endpoint", "open_client", "open_router"]
+__all__ = ["Session", "open_client", "open_router"]
 
-DEFAULT_ENDPOINT: Final = "tcp/127.0.0.1:7447"
 CONNECT_TIMEOUT_S: Final = 2.0
 """How long opening waits for a router by default; it tries again and again within this time."""
-_ENDPOINT: Final = re.compile(
-    r"(?P<protocol>tcp|tls|quic|udp|ws)/(?P<host>\[[0-9A-Fa-f:.]+\]|[^\s:/\[\]]+):(?P<port>\d{1,5})"
-)
 _COMMON: Final[dict[str, Any]] = {
     "scouting/multicast/enabled": False,
     "scouting/gossip/enabled": False,
@@ -32,25 +28,6 @@ _COMMON: Final[dict[str, Any]] = {
     "transport/link/rx/max_message_size": 128 * 1024 * 1024,
 }
 _RETRY: Final = {"period_init_ms": 200, "period_max_ms": 2000, "period_increase_factor": 2}
-
-
-def check_endpoint(endpoint: str) -> str:
-    """Return the endpoint when it is well formed.
-
-    Args:
-        endpoint: ``protocol/host:port``, for example ``tcp/127.0.0.1:7447``.
-
-    Raises:
-        InvalidValueError: It is not.
-    """
-    match = _ENDPOINT.fullmatch(endpoint)
-    if match is None or not 1 <= int(match["port"]) <= 65535:  # noqa: PLR2004 - the range of ports
-        message = (
-            f"'{endpoint}' is not an endpoint: write protocol/host:port, for example {DEFAULT_ENDPOINT} "
-            "(protocols: tcp, tls, quic, udp, ws)."
-        )
-        raise InvalidValueError(message)
-    return endpoint
 
 
 def open_router(listen: str) -> Session:

@@ -1,4 +1,4 @@
-"""What the learner answers without being asked itself: immutable snapshots that it replaces now and then.
+"""What questions are answered from: immutable values that the learner replaces now and then.
 
 Questions are answered at once by the thread that receives them, also while the learner computes.
 """
@@ -6,48 +6,36 @@ Questions are answered at once by the thread that receives them, also while the 
 from collections.abc import Callable, Mapping
 from typing import Final
 
-from hoz_dist.errors import InvalidValueError, NotFoundError, UnknownNameError
-from hoz_dist.nav.categories import SCENES, category_index
+from hoz_dist.errors import InvalidValueError, NotFoundError
+from hoz_dist.graph.planner import EdgeCost, plan_for
+from hoz_dist.nav.categories import SCENES, scene_index
 from hoz_dist.nav.rooms import RoomId
+from hoz_dist.wire.graphs import plan_reply, scene_graph_of
 from hoz_dist.wire.messages import ConfigReply, PlanReply, RoomGraphReply, SceneGraphReply, StatusReply
 
-GraphMessage = SceneGraphReply | RoomGraphReply
-Planner = Callable[[SceneGraphReply, str, tuple[str, ...]], PlanReply]
-"""Plans on a scene graph, given the target's and the seen categories' names."""
-_SEPARATOR: Final = "+"
+GraphReply = SceneGraphReply | RoomGraphReply
+SEEN_SEPARATOR: Final = "+"
 
 
 class Snapshots:
     """The newest of all that can be asked for.
 
-    Each part is replaced as a whole, so that readers in other threads see the old or the new one.
+    Each part is replaced as a whole, so that a reader in another thread sees the old or the new one.
 
     Args:
         config: Answer to ``config``.
-        status: Makes the answer to ``status``; called in the server's thread.
-        plan: Makes a plan; called in the server's thread.
+        status: Makes the answer to ``status``; called in a thread of the server's.
+        edge_cost: What makes a path short in plans.
     """
 
-    def __init__(self, config: ConfigReply, status: Callable[[], StatusReply], plan: Planner) -> None:
+    def __init__(self, config: ConfigReply, status: Callable[[], StatusReply], edge_cost: EdgeCost) -> None:
         self.config = config
-        self._status = status
-        self._plan = plan
-        self._graphs: Mapping[str, GraphMessage] = {}
+        self.status = status
+        self.graphs: Mapping[str, GraphReply] = {}
+        """Graphs by the name of their scene or room; replace it as a whole."""
+        self._edge_cost = edge_cost
 
-    @property
-    def graphs(self) -> Mapping[str, GraphMessage]:
-        """Graphs by the name of their scene or room."""
-        return self._graphs
-
-    def set_graphs(self, graphs: Mapping[str, GraphMessage]) -> None:
-        """Replace all graphs."""
-        self._graphs = dict(graphs)
-
-    def status(self) -> StatusReply:
-        """Return who takes part and how it goes."""
-        return self._status()
-
-    def graph(self, name: str) -> GraphMessage:
+    def graph(self, name: str) -> GraphReply:
         """Return the graph of a scene or of a room.
 
         Raises:
@@ -56,10 +44,11 @@ class Snapshots:
         """
         if name not in SCENES:
             RoomId.parse(name)
-        if name not in self._graphs:
-            message = f"There is no graph of '{name}' yet: no actor of this run has explored {_where(name)}."
+        if name not in self.graphs:
+            where = f"room {name}" if "/" in name else f"a room of scene {name}"
+            message = f"There is no graph of '{name}' yet: no actor of this run has explored {where}."
             raise NotFoundError(message)
-        return self._graphs[name]
+        return self.graphs[name]
 
     def plan(self, scene: str, parameters: Mapping[str, str]) -> PlanReply:
         """Return a plan in a scene.
@@ -73,18 +62,12 @@ class Snapshots:
             NotFoundError: There is no graph of the scene yet.
             InvalidValueError: A parameter is missing.
         """
-        if scene not in SCENES:
-            raise UnknownNameError.of("scene", scene, SCENES)
-        target, seen = parameters.get("target", ""), tuple(filter(None, parameters.get("seen", "").split(_SEPARATOR)))
-        if not target or not seen:
-            message = "A plan needs a target and at least one category that is seen, as in ?target=Microwave;seen=Sink."
+        scene_index(scene)
+        target, seen = parameters.get("target", ""), parameters.get("seen", "")
+        if not target:
+            message = "A plan needs a target, as in ?target=Microwave;seen=Sink+Toaster."
             raise InvalidValueError(message)
-        for name in (target, *seen):
-            category_index(name)
         graph = self.graph(scene)
-        assert isinstance(graph, SceneGraphReply)  # noqa: S101 - a scene's name holds a scene's graph
-        return self._plan(graph, target, seen)
-
-
-def _where(name: str) -> str:
-    return f"room {name}" if "/" in name else f"a room of scene {name}"
+        assert isinstance(graph, SceneGraphReply)  # noqa: S101 - a scene's name stands for a scene graph
+        names = [name for name in seen.split(SEEN_SEPARATOR) if name]
+        return plan_reply(plan_for(scene_graph_of(graph), target, names, self._edge_cost))

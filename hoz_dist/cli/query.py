@@ -1,0 +1,144 @@
+"""`hoz-dist query`: asks a learner for a scene graph, a room graph or a plan."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+import click
+
+from hoz_dist.cli.connecting import connect_option, run_option
+from hoz_dist.errors import InvalidValueError
+
+if TYPE_CHECKING:
+    from hoz_dist.client import HozClient
+    from hoz_dist.graph.scene_graph import SceneGraph
+
+_FORMATS: Final = ("table", "json", "msgpack", "mat", "dot")
+_EXTENSIONS: Final = {f".{name}": name for name in _FORMATS[1:]}
+_BINARY: Final = frozenset({"msgpack", "mat"})
+_PLAN_FORMATS: Final = frozenset({"table", "json", "msgpack"})
+_TOP: Final = 5
+"""Objects named for each zone."""
+
+
+@click.command("query")
+@click.argument("name", metavar="SCENE|ROOM")
+@connect_option
+@run_option
+@click.option("--target", metavar="CATEGORY", help="Object to find: asks for a plan. Needs --seen.")
+@click.option("--seen", metavar="A,B,...", help="Objects that are seen now, such as Sink,Toaster. Needs --target.")
+@click.option(
+    "--format",
+    "chosen",
+    type=click.Choice(_FORMATS),
+    help="How to print it.  [default: by the extension of --output, else table]",
+)
+@click.option("--output", type=click.Path(path_type=Path), metavar="FILE", help="Write to a file instead of printing.")
+@click.option("--force", is_flag=True, help="Replace the output file if it exists.")
+def query_command(
+    *,
+    name: str,
+    connect: str,
+    run: str | None,
+    target: str | None,
+    seen: str | None,
+    chosen: str | None,
+    output: Path | None,
+    force: bool,
+) -> None:
+    """Ask a learner for the graph of SCENE (kitchen) or ROOM (kitchen/3), or for a plan in SCENE.
+
+    Examples: hoz-dist query kitchen --format json
+
+    hoz-dist query kitchen --target Microwave --seen Sink,Toaster
+    """
+    from hoz_dist.client import HozClient
+
+    shape = chosen or _format_of(output)
+    if output is not None:
+        from hoz_dist.graph.atomic import check_writable
+
+        check_writable(output, overwrite=force)
+    elif shape in _BINARY and click.get_text_stream("stdout").isatty():
+        message = f"{shape} is no text for a terminal; add --output FILE, or pipe it to another program."
+        raise InvalidValueError(message)
+    if (target is None) != (seen is None):
+        message = "A plan needs both --target, the object to find, and --seen, what is seen now."
+        raise InvalidValueError(message)
+
+    with HozClient(connect, run) as client:
+        if target is None or seen is None:
+            content = _graph_content(_graph(client, name), shape)
+        else:
+            content = _plan_content(client, name, target, seen, shape)
+    if output is None:
+        click.get_binary_stream("stdout").write(content)
+        return
+    from hoz_dist.graph.atomic import write_atomically
+
+    write_atomically(output, content, overwrite=force)
+    click.echo(f"Wrote {output}.")
+
+
+def _format_of(output: Path | None) -> str:
+    """Return the format that an output file's extension asks for."""
+    return "table" if output is None else _EXTENSIONS.get(output.suffix.lower(), "table")
+
+
+def _graph(client: "HozClient", name: str) -> "SceneGraph":
+    """Ask for the graph of a scene, or of a room, which is the merge of that one room."""
+    if "/" not in name:
+        return client.graph(name)
+    from hoz_dist.graph.scene_graph import merge_rooms
+
+    return merge_rooms(name.partition("/")[0], [client.room_graph(name)], version=0)
+
+
+def _graph_content(graph: "SceneGraph", shape: str) -> bytes:
+    """Return a graph in a format."""
+    from hoz_dist.cli.graph_text import dot, edge_table, title, zone_table
+    from hoz_dist.graph.files import encode_graph
+
+    match shape:
+        case "json" | "msgpack" | "mat":
+            content = encode_graph(graph, shape)
+            return content + b"\n" if shape == "json" else content
+        case "dot":
+            return dot(graph, _TOP).encode() + b"\n"
+        case _:
+            return _printed(title(graph), zone_table(graph, _TOP), edge_table(graph))
+
+
+def _plan_content(client: "HozClient", scene: str, target: str, seen: str, shape: str) -> bytes:
+    """Ask for a plan and return it in a format."""
+    if shape not in _PLAN_FORMATS:
+        message = f"A plan has no {shape} form; choose one of {', '.join(sorted(_PLAN_FORMATS))}."
+        raise InvalidValueError(message)
+    plan = client.plan(scene, target, [name.strip() for name in seen.split(",") if name.strip()])
+    match shape:
+        case "json":
+            import json
+
+            return json.dumps(plan.as_dict()).encode() + b"\n"
+        case "msgpack":
+            import msgpack
+
+            packed: bytes = msgpack.packb(plan.as_dict())
+            return packed
+        case _:
+            from hoz_dist.cli.graph_text import plan_text
+
+            return plan_text(client.graph(scene), plan, target).encode() + b"\n"
+
+
+def _printed(*parts: object) -> bytes:
+    """Return what rich prints for texts and tables, with colours only on a terminal."""
+    from io import StringIO
+
+    from rich.console import Console
+
+    console = Console()
+    text = StringIO()
+    writer = Console(file=text, force_terminal=console.is_terminal, width=console.width)
+    for part in parts:
+        writer.print(part, markup=False, highlight=False)
+    return text.getvalue().encode()

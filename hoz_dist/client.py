@@ -1,0 +1,178 @@
+"""`HozClient`: what a robot or a notebook uses to ask a learner for graphs and plans.
+
+    >>> with HozClient("tcp/127.0.0.1:7447") as client:  # doctest: +SKIP
+    ...     graph = client.graph("kitchen")
+    ...     plan = client.plan("kitchen", target="Microwave", seen=["Sink", "Toaster"])
+
+It needs neither a learning library nor a simulator, and starts in a fraction of a second.
+"""
+
+import threading
+from collections.abc import Sequence
+from contextlib import ExitStack
+from types import TracebackType
+from typing import Any, Final, Self, TypeVar
+
+from hoz_dist.errors import ConnectionFailedError, HozError, InvalidValueError, NotFoundError, UnknownNameError
+from hoz_dist.graph.planner import Plan
+from hoz_dist.graph.room_graph import RoomGraph
+from hoz_dist.graph.scene_graph import SceneGraph
+from hoz_dist.nav.categories import TARGETS, category_index, scene_index
+from hoz_dist.nav.rooms import RoomId
+from hoz_dist.wire.ask import ask
+from hoz_dist.wire.codec import PROTOCOL_VERSION, decode
+from hoz_dist.wire.discovery import find_run, find_runs
+from hoz_dist.wire.endpoint import DEFAULT_ENDPOINT
+from hoz_dist.wire.graphs import plan_of, room_graph_of, scene_graph_of
+from hoz_dist.wire.keys import Keys
+from hoz_dist.wire.messages import (
+    ConfigReply,
+    Message,
+    PlanReply,
+    Refused,
+    RoomGraphReply,
+    SceneGraphReply,
+    StatusReply,
+)
+from hoz_dist.wire.rejection import Reason
+from hoz_dist.wire.session import open_client
+from hoz_dist.wire.snapshots import SEEN_SEPARATOR
+from hoz_dist.wire.waiting import Backoff, Deadline
+
+ANSWER_S: Final = 2.0
+"""How long an answer may take, seconds."""
+_ERRORS: Final[dict[str, type[HozError]]] = {
+    Reason.NAME: UnknownNameError,
+    Reason.NOT_FOUND: NotFoundError,
+    Reason.MALFORMED: InvalidValueError,
+}
+
+M = TypeVar("M", bound=Message)
+
+
+class HozClient:
+    """Asks the learner of a run. Use it in a ``with`` statement; its methods may be called from several threads.
+
+    Args:
+        endpoint: Where the learner or its router listens, for example ``tcp/127.0.0.1:7447``.
+        run: Name of the run; None for the only one that is found.
+
+    Raises:
+        InvalidValueError: The endpoint is malformed.
+        ConnectionFailedError: Nobody answers there.
+    """
+
+    def __init__(self, endpoint: str = DEFAULT_ENDPOINT, run: str | None = None) -> None:
+        self.endpoint = endpoint
+        self._run = run
+        self._keys: Keys | None = None
+        self._open = ExitStack()
+        self._session = self._open.enter_context(open_client(endpoint))
+
+    def runs(self) -> list[str]:
+        """Return the names of the runs whose learners answer now, sorted."""
+        return [config.run for config in find_runs(self._session, ANSWER_S)]
+
+    def config(self) -> dict[str, Any]:
+        """Return what an actor needs to join: ``{"protocol", "run", "epoch", "categories", "config": {...}}``.
+
+        Raises:
+            HozError: No run was found, several were, or the learner does not answer.
+        """
+        reply = self._ask(self._keys_of_run().config, ConfigReply)
+        return {
+            "protocol": PROTOCOL_VERSION,
+            "run": reply.run,
+            "epoch": reply.epoch,
+            "categories": list(reply.categories),
+            "config": reply.config,
+        }
+
+    def status(self) -> dict[str, Any]:
+        """Return who takes part and how it goes: ``{"version", "epoch", "processes": [...], "rejected": {...}, ...}``.
+
+        Raises:
+            HozError: No run was found, several were, or the learner does not answer.
+        """
+        reply = self._ask(self._keys_of_run().status, StatusReply)
+        fields = reply.pack()
+        details = fields.pop("details")
+        assert isinstance(details, dict)  # noqa: S101 - the message was checked when it was made
+        return fields | {name: value for name, value in details.items() if name not in fields}
+
+    def graph(self, scene: str) -> SceneGraph:
+        """Return the newest graph of a scene.
+
+        Raises:
+            UnknownNameError: There is no such scene.
+            NotFoundError: No room of it has been explored yet, or there is no run.
+            HozError: Several runs were found, or the learner does not answer.
+        """
+        scene_index(scene)
+        return scene_graph_of(self._ask(self._keys_of_run().graph(scene), SceneGraphReply))
+
+    def room_graph(self, room: str) -> RoomGraph:
+        """Return the graph of a room, for example ``kitchen/3``.
+
+        Raises:
+            UnknownNameError: There is no such room.
+            NotFoundError: It has not been explored yet, or there is no run.
+            HozError: Several runs were found, or the learner does not answer.
+        """
+        name = str(RoomId.parse(room))
+        return room_graph_of(self._ask(self._keys_of_run().graph(name), RoomGraphReply))
+
+    def plan(self, scene: str, target: str, seen: Sequence[str]) -> Plan:
+        """Return where to go in a scene to find a target.
+
+        Args:
+            scene: The scene.
+            target: Category to find.
+            seen: Categories that are seen now, at least one.
+
+        Raises:
+            UnknownNameError: There is no such scene or category.
+            InvalidValueError: Nothing is seen.
+            NotFoundError: No room of the scene has been explored yet, or there is no run.
+            HozError: Several runs were found, or the learner does not answer.
+        """
+        scene_index(scene)
+        wanted, *visible = (TARGETS[category_index(name)] for name in (target, *seen))
+        selector = f"{self._keys_of_run().plan(scene)}?target={wanted};seen={SEEN_SEPARATOR.join(visible)}"
+        return plan_of(self._ask(selector, PlanReply))
+
+    def close(self) -> None:
+        """Close the session."""
+        self._open.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _keys_of_run(self) -> Keys:
+        """Return the keys of the run, which is looked for when it is first needed."""
+        if self._keys is None:
+            self._keys = Keys(find_run(self._session, self._run, ANSWER_S).run)
+        return self._keys
+
+    def _ask(self, selector: str, expected: type[M]) -> M:
+        """Ask one question.
+
+        Raises:
+            HozError: The learner says that it cannot answer, or does not answer at all.
+        """
+        deadline, backoff = Deadline(ANSWER_S), Backoff(threading.Event())
+        while not (answers := ask(self._session, selector, timeout_s=ANSWER_S)):
+            # Zenoh also gives an empty answer while a learner or router that was away is coming back.
+            if deadline.passed:
+                message = f"The learner at {self.endpoint} does not answer; it may have stopped, or be starting again."
+                raise ConnectionFailedError(message)
+            backoff.pause(deadline)
+        reply = decode(answers[0].payload, expected, Refused)
+        if isinstance(reply, Refused):
+            raise _ERRORS.get(reply.reason, HozError)(reply.detail)
+        return reply  # type: ignore[return-value]  # the only other kind that was expected
