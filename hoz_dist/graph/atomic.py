@@ -41,9 +41,9 @@ def write_atomically(path: Path, content: bytes, *, overwrite: bool) -> None:
         NotFoundError: Its folder does not exist.
         InvalidValueError: It is a folder, exists and must not be replaced, or the system refuses to write it.
     """
-    check_writable(path, overwrite=overwrite)
     temporary = path.with_name(f".{uuid.uuid4().hex}.tmp")
     try:
+        check_writable(path, overwrite=overwrite)
         with temporary.open("xb") as file:
             file.write(content)
             file.flush()

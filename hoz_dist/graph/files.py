@@ -48,19 +48,19 @@ def load_graph(path: Path, scene: str | None = None) -> SceneGraph:
         InvalidValueError: The extension is unknown.
         DamagedFileError: The file does not hold a scene graph.
     """
-    if not path.exists():
-        message = f"There is no graph file '{path}'."
-        raise NotFoundError(message)
-    if path.is_dir():
-        message = f"'{path}' is a folder, not a graph file."
-        raise DamagedFileError(message)
-    file_format = format_of(path)
     try:
         with path.open("rb") as file:
             content = file.read(MAX_FILE_BYTES + 1)
+    except FileNotFoundError:
+        message = f"There is no graph file '{path}'."
+        raise NotFoundError(message) from None
+    except IsADirectoryError:
+        message = f"'{path}' is a folder, not a graph file."
+        raise DamagedFileError(message) from None
     except OSError as error:
         message = f"Cannot read graph file '{path}': {error.strerror}."
         raise DamagedFileError(message) from error
+    file_format = format_of(path)
     try:
         return decode_graph(content, file_format, scene if scene is not None else scene_of_file(path))
     except InvalidValueError as error:

@@ -73,6 +73,12 @@ class SceneGraph:
         return bag
 
 
+def top_objects(graph: SceneGraph, zone: int, count: int) -> list[tuple[str, float]]:
+    """Return the categories seen most often in a zone with their frequencies in (0, 1], most frequent first."""
+    order = np.argsort(-graph.nodes[zone], kind="stable")[:count]
+    return [(graph.categories[index], float(graph.nodes[zone, index])) for index in order if graph.nodes[zone, index]]
+
+
 def merge_rooms(
     scene: str, rooms: Iterable[RoomGraph], version: int, categories: tuple[str, ...] = TARGETS
 ) -> SceneGraph:

@@ -5,8 +5,11 @@ from numpy.typing import NDArray
 
 from hoz_dist.graph.matching import distance
 
+Bag = NDArray[np.floating] | NDArray[np.bool_]
+"""What is seen, [..., N]: 0 or 1, or a confidence in between."""
 
-def current_zone(nodes: NDArray[np.floating], bag: NDArray[np.floating]) -> NDArray[np.int64]:
+
+def current_zone(nodes: NDArray[np.floating], bag: Bag) -> NDArray[np.int64]:
     """Find the zone that is closest to what is seen, argmin_k d(f_t, delta_k) [4.2, Eq. 3].
 
     Args:
@@ -16,12 +19,10 @@ def current_zone(nodes: NDArray[np.floating], bag: NDArray[np.floating]) -> NDAr
     Returns:
         Zone, int64 [...]; the first one of equals.
     """
-    return np.asarray(distance(nodes, np.asarray(bag)[..., None, :]).argmin(axis=-1), dtype=np.int64)
+    return np.asarray(distance(nodes, np.asarray(bag, dtype=np.float64)[..., None, :]).argmin(axis=-1), dtype=np.int64)
 
 
-def update(
-    nodes: NDArray[np.float64], bag: NDArray[np.floating], zone: int | NDArray[np.int64], lam: float
-) -> NDArray[np.float64]:
+def update(nodes: NDArray[np.float64], bag: Bag, zone: int | NDArray[np.int64], lam: float) -> NDArray[np.float64]:
     """Move the current zone towards what is seen [Eq. 4].
 
     delta_t = lambda Zc f' + (I - lambda Zc Zc') delta_{t-1}: the row of the current zone becomes

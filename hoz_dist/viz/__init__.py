@@ -1,0 +1,1 @@
+"""Figures: zones of graphs, and trajectories from above."""
