@@ -42,12 +42,12 @@ def plan_text(graph: SceneGraph, plan: Plan, target: str) -> str:
     def zone(number: int) -> str:
         return f"zone {number} ({', '.join(name for name, _ in top_objects(graph, number, 3)) or 'nothing seen'})"
 
-    category = graph.category(target)
-    frequency = graph.nodes[plan.target, category]
+    index = graph.category(target)
+    category, frequency = graph.categories[index], graph.nodes[plan.target, index]
     return "\n".join(
         [
             f"You are in {zone(plan.current)}.",
-            f"{graph.categories[category]} is most likely in {zone(plan.target)}: seen in {frequency:.0%} of its views.",
+            f"{category} is most likely in {zone(plan.target)}: seen in {frequency:.0%} of its views.",
             f"Go to {zone(plan.subgoal)} next." if plan.subgoal != plan.current else "Look around here.",
             f"Path: {' > '.join(map(str, plan.path))}, probability {plan.probability:.3g}.",
         ]

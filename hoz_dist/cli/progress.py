@@ -113,17 +113,19 @@ class Progress:
         elif self._last:
             self._print()
 
-    def update(self, done: float, note: str = "") -> None:
+    def update(self, done: float, note: str = "", *, total: float | None = None) -> None:
         """Tell how much is done.
 
         Args:
             done: How much is done since the start, in units.
             note: What else is worth saying, shown as it is.
+            total: How much there is to do, if that is known better by now.
         """
         now = self._clock()
+        self._total = self._total if total is None else total
         self._last = progress_text(done, self._total, now - self._start, self._unit, note)
         if self._bar is not None:
-            self._bar.update(self._task, completed=done, text=self._last)
+            self._bar.update(self._task, completed=done, total=self._total, text=self._last)
         elif now - self._printed >= self._every:
             self._printed = now
             self._print()

@@ -1,5 +1,6 @@
 """`hoz-dist query`: asks a learner for a scene graph, a room graph or a plan."""
 
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -58,7 +59,7 @@ def query_command(
         from hoz_dist.graph.atomic import check_writable
 
         check_writable(output, overwrite=force)
-    elif shape in _BINARY and click.get_text_stream("stdout").isatty():
+    elif shape in _BINARY and sys.stdout.isatty():
         message = f"{shape} is no text for a terminal; add --output FILE, or pipe it to another program."
         raise InvalidValueError(message)
     if (target is None) != (seen is None):
@@ -71,7 +72,7 @@ def query_command(
         else:
             content = _plan_content(client, name, target, seen, shape)
     if output is None:
-        click.get_binary_stream("stdout").write(content)
+        click.echo(content, nl=False)
         return
     from hoz_dist.graph.atomic import write_atomically
 

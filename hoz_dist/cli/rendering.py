@@ -3,16 +3,16 @@
 import multiprocessing
 import signal
 from collections.abc import Iterable, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor
-from multiprocessing.managers import SyncManager
+from multiprocessing.process import BaseProcess
+from multiprocessing.queues import Queue, SimpleQueue
 from pathlib import Path
-from queue import Empty, Queue
-from threading import Event
+from queue import Empty
 from typing import Final, NamedTuple
 
 import numpy as np
 
 from hoz_dist.cli.progress import Progress
+from hoz_dist.errors import HozError, InvalidValueError
 from hoz_dist.nav.pose import GRID_M, YAWS, Pose
 from hoz_dist.nav.rooms import RoomId
 from hoz_dist.policy.encoders import load_encoder
@@ -26,21 +26,24 @@ _POLL_S: Final = 0.2
 
 
 class _Report(NamedTuple):
+    """What a rendering process says of a room."""
+
     room: RoomId
-    done: int
+    done: int = 0
     """Views that are ready."""
-    total: int
-
-
-class _StoppedError(Exception):
-    """The main process gave up."""
+    total: int = 0
+    cached: bool = False
+    """Whether the cache had them all."""
+    ended: bool = False
+    error: str = ""
+    """Why the room cannot be rendered; empty when it can."""
 
 
 def render_rooms(rooms: Sequence[RoomId], cache: Path, picture_size: int, jobs: int) -> int:
     """Render the views of rooms that the cache lacks, with the default encoder's features.
 
     Args:
-        rooms: The rooms, each once.
+        rooms: The rooms, each once, at least one.
         cache: The view cache.
         picture_size: Side of the pictures, pixels.
         jobs: Processes that render at once.
@@ -49,28 +52,27 @@ def render_rooms(rooms: Sequence[RoomId], cache: Path, picture_size: int, jobs: 
         The number of views of all rooms.
 
     Raises:
-        HozError: The cache cannot be written.
+        HozError: The cache cannot be written, or a process was killed.
     """
     context = multiprocessing.get_context("spawn")
-    with (
-        context.Manager() as manager,
-        # Ctrl-C reaches every process of the terminal; only this one acts on it, and tells the others.
-        ProcessPoolExecutor(
-            min(jobs, len(rooms)),
-            mp_context=context,
-            initializer=signal.signal,
-            initargs=(signal.SIGINT, signal.SIG_IGN),
-        ) as pool,
-    ):
-        reports, stop = _channels(manager)
-        tasks = [pool.submit(_render_room, room, cache, picture_size, reports, stop) for room in rooms]
-        try:
-            _show_progress(tasks, reports, len(rooms))
-            return sum(task.result() for task in tasks)
-        except BaseException:
-            stop.set()
-            pool.shutdown(cancel_futures=True)
-            raise
+    tasks: SimpleQueue[RoomId | None] = context.SimpleQueue()
+    reports: Queue[_Report] = context.Queue()
+    count = min(jobs, len(rooms))
+    for task in [*rooms, *[None] * count]:
+        tasks.put(task)
+    workers = [
+        context.Process(target=_render, args=(tasks, reports, cache, picture_size), daemon=True) for _ in range(count)
+    ]
+    for worker in workers:
+        worker.start()
+    try:
+        return _follow(workers, reports, len(rooms))
+    finally:
+        # Whatever ends this, rendering ends with it: the store takes no harm when a process is killed.
+        for worker in workers:
+            worker.terminate()
+        for worker in workers:
+            worker.join()
 
 
 def write_contact_sheet(rooms: Iterable[RoomId], store: ViewStore, output: Path) -> None:
@@ -100,36 +102,51 @@ def write_contact_sheet(rooms: Iterable[RoomId], store: ViewStore, output: Path)
     imsave(output, np.concatenate(rows, axis=0))
 
 
-def _channels(manager: SyncManager) -> tuple["Queue[_Report]", Event]:
-    """Make what the processes talk through: reports of progress, and the word to stop."""
-    return manager.Queue(), manager.Event()
+def _render(tasks: "SimpleQueue[RoomId | None]", reports: "Queue[_Report]", cache: Path, picture_size: int) -> None:
+    """Fill the cache for one room after another; the body of a rendering process."""
+    # Ctrl-C reaches every process of the terminal; the main process acts on it.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    encoder, store = load_encoder("pooled"), ViewStore(cache, picture_size)
+    while (room := tasks.get()) is not None:
+        rendered = False
+
+        def report(done: int, total: int, room: RoomId = room) -> None:
+            nonlocal rendered
+            rendered = True
+            reports.put(_Report(room, done, total))
+
+        try:
+            views = store.open(room, encoder, report).graph.views
+        except HozError as error:
+            reports.put(_Report(room, ended=True, error=str(error)))
+        else:
+            reports.put(_Report(room, views, views, cached=not rendered, ended=True))
 
 
-def _render_room(room: RoomId, cache: Path, picture_size: int, reports: "Queue[_Report]", stop: Event) -> int:
-    """Fill the cache for one room, in a process of the pool; returns the number of its views."""
+def _follow(workers: Sequence[BaseProcess], reports: "Queue[_Report]", rooms: int) -> int:
+    """Show progress until all rooms have ended; returns the number of their views.
 
-    def report(done: int, total: int) -> None:
-        if stop.is_set():
-            raise _StoppedError
-        reports.put(_Report(room, done, total))
-
-    return ViewStore(cache, picture_size).open(room, load_encoder("pooled"), report).graph.views
-
-
-def _show_progress(tasks: Sequence["Future[int]"], reports: "Queue[_Report]", rooms: int) -> None:
-    """Show reports until all tasks have ended, or one has failed."""
+    Raises:
+        HozError: A room cannot be rendered, or a process was killed.
+    """
     latest: dict[RoomId, _Report] = {}
-    with Progress("Rendering", rooms, "rooms") as progress:
-        while True:
-            ended = sum(task.done() for task in tasks)
-            failed = any(task.done() and task.exception() is not None for task in tasks)
+    with Progress("Rendering", 0, "views") as progress:
+        while sum(report.ended for report in latest.values()) < rooms:
             try:
                 report = reports.get(timeout=_POLL_S)
             except Empty:
-                if failed or ended == len(tasks):
-                    return
+                if any(worker.exitcode not in {None, 0} for worker in workers):
+                    message = "A rendering process was killed, perhaps for want of memory; try again with fewer --jobs."
+                    raise InvalidValueError(message) from None
                 continue
+            if report.error:
+                raise InvalidValueError(report.error)
             latest[report.room] = report
-            shares = sum(known.done / max(known.total, 1) for known in latest.values())
-            views = sum(known.done for known in latest.values())
-            progress.update(max(shares, ended), f"{views:,} views  {report.room}")
+            rendering = [known for known in latest.values() if not known.cached]
+            if rendering:
+                done = sum(known.done for known in rendering)
+                total = sum(known.total for known in rendering)
+                # Rooms that were not opened yet count as the average of those that were.
+                total += total * (rooms - len(latest)) // len(rendering)
+                progress.update(done, str(report.room), total=total)
+    return sum(report.total for report in latest.values())

@@ -1,4 +1,8 @@
 import json
+import os
+import signal
+import subprocess
+import sys
 from pathlib import Path
 
 import matplotlib.image
@@ -49,3 +53,17 @@ def test_render_says_in_one_sentence_that_the_cache_cannot_be_written(
     command = ["scenes", "render", "bathroom/1", "--picture-size", "24", "--cache", str(tmp_path / "file" / "views")]
     assert run(command) == 2
     assert "cannot be written" in capsys.readouterr().err.splitlines()[-1]
+
+
+def test_ctrl_c_ends_rendering_at_once_and_quietly(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "hoz_dist.cli.main", "scenes", "render", "kitchen", "--cache", str(tmp_path)]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True) as process:
+        assert process.stderr is not None
+        said = []
+        while not said or not said[-1].startswith("Rendering"):
+            said.append(process.stderr.readline())
+            assert said[-1], "it ended by itself"
+        os.killpg(process.pid, signal.SIGINT)  # as a terminal does: every process of the command gets it
+        said += process.stderr.readlines()
+    assert process.returncode == 130
+    assert not [line for line in said if "Traceback" in line]

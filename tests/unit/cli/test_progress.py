@@ -58,6 +58,14 @@ def test_elsewhere_than_on_a_terminal_lines_come_seldom_and_the_last_state_alway
     assert lines[0] == "Rendering    8%  8/100 views  8 views/s  [kitchen/3]  12 s left"
 
 
+def test_the_total_may_become_known_better_on_the_way() -> None:
+    out = io.StringIO()
+    with Progress("Rendering", 10, "views", console=Console(file=out), every=0.0, clock=Clock()) as progress:
+        progress.update(5)
+        progress.update(5, total=20)
+    assert [line.split()[1] for line in out.getvalue().splitlines()] == ["50%", "25%"]
+
+
 def test_a_terminal_gets_a_bar() -> None:
     out, clock = io.StringIO(), Clock()
     console = Console(file=out, force_terminal=True, width=120)
