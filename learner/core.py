@@ -202,7 +202,7 @@ class LearnerCore:
         lag, size = self.version - push.version, self._optimizer.size
         unknown = self._schedule is not None and self._schedule.turn(push.actor, push.sequence) == "never"
         checks = (
-            (self.finished, Reason.STALE, "finished: the budget is used up"),
+            (self.finished, Reason.FINISHED, "the budget is used up"),
             (push.epoch != self.epoch, Reason.EPOCH, f"computed in epoch {push.epoch}, now is {self.epoch}"),
             (lag < 0, Reason.STALE, f"computed on version {push.version}, the newest is {self.version}"),
             (lag > self.config.max_lag, Reason.STALE, f"{lag} versions behind, the bound is {self.config.max_lag}"),

@@ -207,8 +207,7 @@ def test_the_learning_rate_falls_with_the_frames_and_the_run_finishes() -> None:
     assert finishes == 1
     assert core.status(0.0)["progress"] == 1.0
     before = core.parameters.copy()
-    refusal = refused(core, gradient(4, version=4))
-    assert refusal.detail.startswith("finished")
+    assert refused(core, gradient(4, version=4)).reason == Reason.FINISHED
     np.testing.assert_array_equal(core.parameters, before)
     assert isinstance(answer(core, EpisodesReceived(0, episodes(0, ("kitchen/1", True)))), Accepted)
     assert core.handle(Tick(), now=1.0) == []
