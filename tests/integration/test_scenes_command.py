@@ -59,7 +59,7 @@ def test_ctrl_c_ends_rendering_at_once_and_quietly(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "hoz_dist.cli.main", "scenes", "render", "kitchen", "--cache", str(tmp_path)]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True) as process:
         assert process.stderr is not None
-        said = []
+        said: list[str] = []
         while not said or not said[-1].startswith("Rendering"):
             said.append(process.stderr.readline())
             assert said[-1], "it ended by itself"
