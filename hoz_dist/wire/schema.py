@@ -129,7 +129,7 @@ class OneOf(Scalar):
 
     def check(self, value: Any, where: str) -> None:
         """Judge a value; see `Spec.check`."""
-        if type(value) is not str:
+        if not isinstance(value, str):  # a member of a StrEnum will do
             raise _wrong_type(where, "a text", value)
         if value not in self.names:
             raise RejectedError(Reason.NAME, f"{where} is unknown: {value[:80]!r}")

@@ -34,13 +34,19 @@ class Server:
         keys: Keys of the run.
         snapshots: What questions are answered from.
         inbox: Where pushes wait; the learner takes them out and answers them.
+
+    Attributes:
+        session: The session.
+        inbox: The inbox.
+        rejections: What was rejected so far, by the wire and by the learner.
+        snapshots: The snapshots.
     """
 
     def __init__(self, session: Session, keys: Keys, snapshots: Snapshots, inbox: Inbox | None = None) -> None:
         self.inbox = inbox or Inbox()
         self.rejections = Rejections()
         self.snapshots = snapshots
-        self._session = session
+        self.session = session
         self._keys = keys
         self._publishers: dict[str, NewestPublisher] = {}
         handlers: dict[str, Callable[[Query], None]] = {
@@ -63,7 +69,7 @@ class Server:
             name, reply = graph.room, room_graph_reply(graph)
         self.snapshots.graphs = {**self.snapshots.graphs, name: reply}
         if name not in self._publishers:
-            self._publishers[name] = NewestPublisher(self._session, self._keys.graph(name))
+            self._publishers[name] = NewestPublisher(self.session, self._keys.graph(name))
         self._publishers[name].publish(reply)
 
     def close(self) -> None:

@@ -20,6 +20,7 @@ CONNECT_TIMEOUT_S: Final = 2.0
 _COMMON: Final[dict[str, Any]] = {
     "scouting/multicast/enabled": False,
     "scouting/gossip/enabled": False,
+    "scouting/delay": 0,  # nothing is scouted for; a router would wait half a second for it all the same
     # Plain bytes: implicit shared memory leaks segments of killed processes, and serves messages up to 16 MB only.
     "transport/shared_memory/enabled": False,
     # A receiver that stalls longer than this loses the transport, and with it what was in flight (5 s by default).

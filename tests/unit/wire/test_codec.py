@@ -1,0 +1,254 @@
+"""Every message survives the wire; hostile bytes are rejected by name, and never do anything else."""
+
+from contextlib import suppress
+from typing import Any
+
+import msgpack
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hoz_dist.wire.codec import MESSAGES, PROTOCOL_VERSION, checksum, decode, encode
+from hoz_dist.wire.messages import Accepted, EpisodesPush, GradientPush, Message, RoomGraphPush
+from hoz_dist.wire.rejection import Reason, RejectedError
+from tests import wire_samples as samples
+
+KINDS = tuple(MESSAGES.values())
+
+
+def fields_of(message: Message) -> dict[str, Any]:
+    fields: dict[str, Any] = msgpack.unpackb(encode(message))
+    return fields
+
+
+def reason_of(data: bytes, *expected: type[Message]) -> Reason:
+    with pytest.raises(RejectedError) as caught:
+        decode(data, *(expected or KINDS))
+    assert caught.value.detail
+    return caught.value.reason
+
+
+def altered(message: Message, **fields: object) -> bytes:
+    packed: bytes = msgpack.packb(fields_of(message) | fields)
+    return packed
+
+
+def test_there_is_a_sample_of_every_kind() -> None:
+    assert {type(message) for message in samples.MESSAGES} == set(KINDS)
+
+
+@pytest.mark.parametrize("message", samples.MESSAGES, ids=lambda message: message.KIND)
+def test_every_message_survives(message: Message) -> None:
+    decoded = decode(encode(message), *KINDS)
+    assert type(decoded) is type(message)
+    assert encode(decoded) == encode(message)
+
+
+def test_values_arrive_as_they_were() -> None:
+    push = samples.gradient_push(sequence=4)
+    decoded = decode(encode(push), GradientPush)
+    np.testing.assert_array_equal(decoded.gradient, push.gradient)
+    assert (decoded.actor, decoded.incarnation, decoded.sequence, decoded.epoch, decoded.version, decoded.frames) == (
+        *("a0", 77, 4),
+        *(1, 5, 40),
+    )
+    episodes = decode(encode(samples.MESSAGES[1]), EpisodesPush).episodes
+    assert episodes == (samples.EPISODE, samples.EPISODE)
+
+
+def test_the_bytes_are_those_of_the_protocol() -> None:
+    push = GradientPush("a0", 1, 2, 3, 4, 5, np.array([1.0, -2.0], np.float32))
+    assert msgpack.unpackb(encode(push)) == {
+        "v": PROTOCOL_VERSION,
+        "kind": "gradient",
+        "actor": "a0",
+        "incarnation": 1,
+        "sequence": 2,
+        "epoch": 3,
+        "version": 4,
+        "frames": 5,
+        "gradient": {"dtype": "float32", "shape": [2], "data": bytes.fromhex("0000803f000000c0")},
+    }
+    assert checksum(b"").hex() == "2d06800538d394c2"  # XXH3_64 of nothing, as xxHash states it
+
+
+def test_decoding_a_gradient_does_not_copy_it_again() -> None:
+    decoded = decode(encode(samples.gradient_push()), GradientPush)
+    assert decoded.gradient.base is not None
+    assert not decoded.gradient.flags.writeable
+
+
+def test_languages_with_one_type_of_number_may_send_whole_numbers() -> None:
+    data = altered(samples.MESSAGES[1], frames_per_second=120)
+    assert decode(data, EpisodesPush).frames_per_second == 120.0
+
+
+PUSH = samples.gradient_push()
+TENSOR = fields_of(PUSH)["gradient"]
+ROOM_PUSH = samples.MESSAGES[2]
+NODES = fields_of(ROOM_PUSH)["nodes"]
+
+
+@pytest.mark.parametrize(
+    ("data", "reason"),
+    [
+        (b"", Reason.MALFORMED),
+        (b"\xc1", Reason.MALFORMED),
+        (encode(PUSH)[:-1], Reason.MALFORMED),
+        (encode(PUSH) + b"\x00", Reason.MALFORMED),
+        (msgpack.packb([1, 2]), Reason.MALFORMED),
+        (b"\x81" * 2000, Reason.MALFORMED),
+        (b"\x91" * 100_000, Reason.MALFORMED),
+        (b"\xdd\xff\xff\xff\xff", Reason.MALFORMED),
+        (b"\xdf\xff\xff\xff\xff", Reason.MALFORMED),
+        (msgpack.packb({"v": msgpack.ExtType(4, b"x")}), Reason.MALFORMED),
+        (msgpack.packb({1: 2}), Reason.MALFORMED),
+        (b"\x81\xa1\xff\x01", Reason.MALFORMED),
+        (msgpack.packb({}), Reason.VERSION),
+        (altered(PUSH, v=2), Reason.VERSION),
+        (altered(PUSH, v=True), Reason.VERSION),
+        (altered(PUSH, kind="gradients"), Reason.KIND),
+        (altered(PUSH, kind=["gradient"]), Reason.KIND),
+        (encode(Accepted(1, 2)), Reason.KIND),
+        (altered(PUSH, extra=1), Reason.FIELDS),
+        (msgpack.packb({"v": 1, "kind": "gradient"}), Reason.FIELDS),
+        (altered(PUSH, frames="40"), Reason.TYPE),
+        (altered(PUSH, frames=40.0), Reason.TYPE),
+        (altered(PUSH, frames=True), Reason.TYPE),
+        (altered(PUSH, frames=None), Reason.TYPE),
+        (altered(PUSH, frames=0), Reason.RANGE),
+        (altered(PUSH, epoch=-1), Reason.RANGE),
+        (altered(PUSH, sequence=2**64 - 1), Reason.RANGE),
+        (altered(PUSH, actor="a/b"), Reason.NAME),
+        (altered(PUSH, actor="*"), Reason.NAME),
+        (altered(PUSH, actor="x" * 65), Reason.SIZE),
+        (altered(PUSH, gradient=b"raw"), Reason.TYPE),
+        (altered(PUSH, gradient=TENSOR | {"order": "F"}), Reason.FIELDS),
+        (altered(PUSH, gradient=TENSOR | {"dtype": "float64"}), Reason.DTYPE),
+        (altered(PUSH, gradient=TENSOR | {"dtype": "object"}), Reason.DTYPE),
+        (altered(PUSH, gradient=TENSOR | {"dtype": ["f4"]}), Reason.DTYPE),
+        (altered(PUSH, gradient=TENSOR | {"data": "text"}), Reason.TYPE),
+        (altered(PUSH, gradient=TENSOR | {"shape": [99]}), Reason.SHAPE),
+        (altered(PUSH, gradient=TENSOR | {"shape": [-100]}), Reason.SHAPE),
+        (altered(PUSH, gradient=TENSOR | {"shape": [10, 10]}), Reason.SHAPE),
+        (altered(PUSH, gradient=TENSOR | {"shape": [True] * 2}), Reason.SHAPE),
+        (altered(PUSH, gradient=TENSOR | {"shape": [2**62, 2**62, 0], "data": b""}), Reason.SHAPE),
+        (altered(PUSH, gradient=TENSOR | {"shape": [0], "data": b""}), Reason.SHAPE),
+        (altered(PUSH, gradient=TENSOR | {"data": np.full(100, np.nan, "<f4").tobytes()}), Reason.NONFINITE),
+        (altered(PUSH, gradient=TENSOR | {"data": np.full(100, -np.inf, "<f4").tobytes()}), Reason.NONFINITE),
+    ],
+)
+def test_what_is_wrong_with_a_gradient_has_a_name(data: bytes, reason: Reason) -> None:
+    assert reason_of(data, GradientPush) == reason
+
+
+@pytest.mark.parametrize(
+    ("data", "reason"),
+    [
+        (altered(ROOM_PUSH, room="kitchen"), Reason.NAME),
+        (altered(ROOM_PUSH, room="kitchen/31"), Reason.NAME),
+        (altered(ROOM_PUSH, room=3), Reason.TYPE),
+        (altered(ROOM_PUSH, digest="d" * 65), Reason.SIZE),
+        (altered(ROOM_PUSH, categories=["Sofa"] * 22), Reason.NAME),
+        (altered(ROOM_PUSH, categories=["Pan"] * 22), Reason.NAME),
+        (altered(ROOM_PUSH, categories=["Pan"]), Reason.SHAPE),
+        (altered(ROOM_PUSH, categories=["Pan"] * 23), Reason.SIZE),
+        (altered(ROOM_PUSH, categories="Pan"), Reason.TYPE),
+        (altered(ROOM_PUSH, nodes=NODES | {"shape": [22, 8]}), Reason.SHAPE),
+        (altered(ROOM_PUSH, nodes=NODES | {"data": np.full((8, 22), 1.5).tobytes()}), Reason.RANGE),
+        (altered(ROOM_PUSH, nodes=NODES | {"data": np.full((8, 22), -0.1).tobytes()}), Reason.RANGE),
+        (altered(ROOM_PUSH, edges=NODES), Reason.SHAPE),
+        (altered(ROOM_PUSH, edges={"dtype": "float64", "shape": [8, 8], "data": bytes(512)}), Reason.RANGE),
+    ],
+)
+def test_what_is_wrong_with_a_room_graph_has_a_name(data: bytes, reason: Reason) -> None:
+    assert reason_of(data, RoomGraphPush) == reason
+
+
+@pytest.mark.parametrize(
+    ("episode", "reason"),
+    [
+        (["kitchen/3", 5, True, 9, 4, True], Reason.TYPE),
+        ({"room": "kitchen/3"}, Reason.TYPE),
+        (["kitchen/99", 5, True, 9, 4, True, 7], Reason.NAME),
+        (["kitchen/3", 22, True, 9, 4, True, 7], Reason.RANGE),
+        (["kitchen/3", 5, 1, 9, 4, True, 7], Reason.TYPE),
+        (["kitchen/3", 5, True, 0, 0, True, 7], Reason.RANGE),
+        (["kitchen/3", 5, True, 9, 10, True, 7], Reason.RANGE),
+    ],
+)
+def test_what_is_wrong_with_an_episode_has_a_name(episode: object, reason: Reason) -> None:
+    assert reason_of(altered(samples.MESSAGES[1], episodes=[episode]), EpisodesPush) == reason
+
+
+def test_a_message_longer_than_its_kind_may_be_is_not_even_read() -> None:
+    assert reason_of(bytes(Accepted.MOST_BYTES + 1), Accepted) == Reason.SIZE
+
+
+def test_a_long_list_is_rejected() -> None:
+    many = [list(samples.EPISODE)] * 5000
+    many = [[str(samples.ROOM), *row[1:]] for row in many]
+    assert reason_of(altered(samples.MESSAGES[1], episodes=many), EpisodesPush) == Reason.MALFORMED
+
+
+def test_invalid_messages_cannot_be_made_to_be_sent() -> None:
+    with pytest.raises(RejectedError, match="gradient holds NaN"):
+        GradientPush("a0", 1, 0, 1, 1, 1, np.array([np.nan], np.float32))
+    with pytest.raises(RejectedError, match="gradient is float64"):
+        GradientPush("a0", 1, 0, 1, 1, 1, np.zeros(3))  # type: ignore[arg-type]
+    with pytest.raises(RejectedError, match="actor is not well formed"):
+        GradientPush("a b", 1, 0, 1, 1, 1, np.zeros(3, np.float32))
+
+
+def test_finite_numbers_whose_squares_overflow_are_accepted() -> None:
+    huge = np.full(4, 3e38, np.float32)
+    push = GradientPush("a0", 1, 0, 1, 1, 1, huge)
+    np.testing.assert_array_equal(decode(encode(push), GradientPush).gradient, huge)
+
+
+def only_rejects(data: bytes, *expected: type[Message]) -> None:
+    with suppress(RejectedError):
+        decode(data, *expected)
+
+
+@settings(max_examples=300, deadline=None)
+@given(st.binary(max_size=300))
+def test_arbitrary_bytes_are_decoded_or_rejected(data: bytes) -> None:
+    only_rejects(data, *KINDS)
+
+
+MSGPACK_VALUES = st.recursive(
+    st.none()
+    | st.booleans()
+    | st.integers(-(2**63), 2**64 - 1)
+    | st.floats()
+    | st.text(max_size=8)
+    | st.binary(max_size=9),
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=8), inner, max_size=4),
+    max_leaves=8,
+)
+
+
+@settings(max_examples=400, deadline=None)
+@given(st.data())
+def test_messages_with_any_field_replaced_are_decoded_or_rejected(data: st.DataObject) -> None:
+    fields = fields_of(data.draw(st.sampled_from(samples.MESSAGES)))
+    name = data.draw(st.sampled_from(sorted(fields)))
+    inner = fields[name]
+    if isinstance(inner, dict) and inner and data.draw(st.booleans()):
+        inner = inner | {data.draw(st.sampled_from(sorted(inner))): data.draw(MSGPACK_VALUES)}
+    else:
+        inner = data.draw(MSGPACK_VALUES)
+    only_rejects(msgpack.packb(fields | {name: inner}), *KINDS)
+
+
+@settings(max_examples=300, deadline=None)
+@given(st.data())
+def test_damaged_messages_are_decoded_or_rejected(data: st.DataObject) -> None:
+    damaged = bytearray(encode(data.draw(st.sampled_from(samples.MESSAGES))))
+    for _ in range(data.draw(st.integers(1, 8))):
+        damaged[data.draw(st.integers(0, len(damaged) - 1))] = data.draw(st.integers(0, 255))
+    cut = data.draw(st.integers(0, len(damaged)))
+    only_rejects(bytes(damaged), *KINDS)
+    only_rejects(bytes(damaged[:cut]), *KINDS)

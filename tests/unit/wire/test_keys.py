@@ -1,0 +1,47 @@
+import pytest
+import zenoh
+
+from hoz_dist.errors import InvalidValueError
+from hoz_dist.nav.rooms import RoomId
+from hoz_dist.wire.keys import ALL_CONFIGS, Keys, check_name
+
+
+def test_the_keys_are_those_of_the_protocol() -> None:
+    keys = Keys("night-3")
+    assert keys.config == "hoz/night-3/config"
+    assert keys.params == "hoz/night-3/params"
+    assert keys.shard(2) == "hoz/night-3/params/2"
+    assert keys.grads("a0") == "hoz/night-3/grads/a0"
+    assert keys.rollouts("a0") == "hoz/night-3/rollouts/a0"
+    assert keys.room(RoomId("kitchen", 3)) == "hoz/night-3/rooms/kitchen/3"
+    assert keys.graph("kitchen/3") == "hoz/night-3/graphs/kitchen/3"
+    assert keys.plan("kitchen") == "hoz/night-3/plan/kitchen"
+    assert keys.status == "hoz/night-3/status"
+    assert keys.alive("actor", "a0") == "hoz/night-3/alive/actor/a0"
+
+
+def test_wildcards_select_the_keys() -> None:
+    keys = Keys("r")
+    pairs = [
+        (ALL_CONFIGS, keys.config),
+        (keys.shards, keys.shard(0)),
+        (keys.all_grads, keys.grads("a0")),
+        (keys.all_rollouts, keys.rollouts("a0")),
+        (keys.all_rooms, keys.room(RoomId("kitchen", 3))),
+        (keys.all_graphs, keys.graph("kitchen")),
+        (keys.all_graphs, keys.graph("kitchen/3")),
+        (keys.all_plans, keys.plan("bathroom")),
+        (keys.all_alive, keys.alive("actor", "a0")),
+    ]
+    for selector, key in pairs:
+        assert zenoh.KeyExpr(selector).includes(zenoh.KeyExpr(key)), (selector, key)
+
+
+@pytest.mark.parametrize(
+    "name", ["", "a/b", "*", "a**", "$*", "@v1", "a?b", "a#b", "-a", ".", "é", "a b", "x" * 65, "a\n"]
+)
+def test_names_that_would_change_the_meaning_of_a_key_are_refused(name: str) -> None:
+    with pytest.raises(InvalidValueError, match="The run name"):
+        Keys(name)
+    with pytest.raises(InvalidValueError, match="The actor name"):
+        check_name("actor", name)

@@ -1,0 +1,95 @@
+"""Valid messages and a small learner, for the tests of the wire and of the client."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import numpy as np
+
+from hoz_dist.graph.room_graph import RoomGraph
+from hoz_dist.graph.scene_graph import SceneGraph
+from hoz_dist.nav.categories import TARGETS
+from hoz_dist.nav.episode import EpisodeResult
+from hoz_dist.nav.rooms import RoomId
+from hoz_dist.wire.graphs import room_graph_reply, scene_graph_reply
+from hoz_dist.wire.keys import Keys
+from hoz_dist.wire.messages import (
+    Accepted,
+    Busy,
+    ConfigReply,
+    EpisodesPush,
+    GradientPush,
+    Message,
+    ParametersHead,
+    ParametersShard,
+    PlanReply,
+    ProcessStatus,
+    Refused,
+    RoomGraphPush,
+    StatusReply,
+)
+from hoz_dist.wire.server import Server
+from hoz_dist.wire.session import Session, open_router
+from hoz_dist.wire.snapshots import Snapshots
+
+KEYS = Keys("run-1")
+ROOM = RoomId("kitchen", 3)
+EPISODE = EpisodeResult(ROOM, target=5, success=True, actions=9, moves=4, said_done=True, optimal=7)
+
+
+def zone_graph(zones: int = 8) -> tuple[np.ndarray, np.ndarray]:
+    """Nodes [K, N] and edges [K, K]."""
+    rng = np.random.default_rng(7)
+    edges = rng.uniform(0.01, 0.9, (zones, zones))
+    edges = (edges + edges.T) / 2
+    np.fill_diagonal(edges, 1.0)
+    return rng.uniform(0, 1, (zones, len(TARGETS))), edges
+
+
+def room_graph() -> RoomGraph:
+    return RoomGraph(str(ROOM), "d1", *zone_graph())
+
+
+def scene_graph(version: int = 2) -> SceneGraph:
+    return SceneGraph("kitchen", version, ("kitchen/1", "kitchen/3"), TARGETS, *zone_graph())
+
+
+def gradient_push(sequence: int = 0, actor: str = "a0", size: int = 100) -> GradientPush:
+    gradient = np.random.default_rng(sequence).normal(size=size).astype(np.float32)
+    return GradientPush(actor, incarnation=77, sequence=sequence, epoch=1, version=5, frames=40, gradient=gradient)
+
+
+def config_reply(epoch: int = 1) -> ConfigReply:
+    return ConfigReply(KEYS.run, epoch, TARGETS, {"method": "hoz", "seed": 3, "learning_rate": 1e-3, "minutes": None})
+
+
+def status_reply() -> StatusReply:
+    actor = ProcessStatus("actor", "a0", ("kitchen/3",), frames=800, frames_per_second=120.5, lag=1.5, rejected=1)
+    details = {"frames": 800, "progress": 0.25, "success": {"overall": None, "scenes": {}}}
+    return StatusReply(5, 1, (actor, ProcessStatus("learner", "l0")), {"epoch": 1}, details)
+
+
+HEAD = ParametersHead(epoch=1, version=5, digest="0123456789abcdef", size=100, shards=1)
+MESSAGES: tuple[Message, ...] = (
+    gradient_push(),
+    EpisodesPush("a0", 77, 3, frames=400, frames_per_second=99.5, lag=0.25, episodes=(EPISODE, EPISODE)),
+    RoomGraphPush("a0", 77, 0, ROOM, "d1", TARGETS, *zone_graph()),
+    Accepted(1, 5),
+    Busy(),
+    Refused("stale", "too old"),
+    HEAD,
+    ParametersShard(HEAD, 0, np.arange(100, dtype=np.float32)),
+    config_reply(),
+    scene_graph_reply(scene_graph()),
+    room_graph_reply(room_graph()),
+    PlanReply(0, 3, 2, (0, 2, 3), 0.25),
+    status_reply(),
+)
+"""One message of every kind."""
+
+
+@contextmanager
+def serving(endpoint: str, epoch: int = 1) -> Iterator[tuple[Server, Session]]:
+    """A learner's session and server, with nobody who takes pushes out of its inbox."""
+    snapshots = Snapshots(config_reply(epoch), status_reply, "product")
+    with open_router(endpoint) as session, Server(session, KEYS, snapshots) as server:
+        yield server, session
