@@ -95,6 +95,9 @@ def learner_command(
     import signal
     import threading
 
+    # Before the imports that take seconds: it says what is wrong with the options.
+    config = _config(weights, learning_rate, choices)
+
     import torch
 
     from learner.service import LearnerSettings, serve
@@ -103,7 +106,7 @@ def learner_command(
     settings = LearnerSettings(
         listen=listen,
         run=run,
-        config=_config(weights, learning_rate, choices),
+        config=config,
         checkpoint_seconds=checkpoint_seconds,
         replay=replay,
         exit_when_done=exit_when_done,
