@@ -2,7 +2,9 @@
 
 from collections.abc import Sequence
 from types import TracebackType
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Final, Self
+
+import numpy as np
 
 from hoz_dist.sim.pose_graph import PoseGraph, build_pose_graph
 from hoz_dist.sim.room import Room
@@ -10,6 +12,13 @@ from hoz_dist.sim.view_folder import Frames
 
 if TYPE_CHECKING:
     from hoz_dist.sim.camera import Camera
+
+ASIDE_M: Final = (1e-4, 1.7e-4)
+"""A step aside, (x, z) in metres, too small to show.
+
+PyBullet's renderer gives depths that are not numbers where an edge of a surface lies exactly in the camera's own plane,
+as for a camera that looks along a diagonal from the diagonal of a corner.
+"""
 
 
 class Painter:
@@ -54,8 +63,13 @@ class Painter:
             views: The views, [M].
         """
         frames = Frames.empty(len(views), self._size)
+        camera = self._eye()
         for row, view in enumerate(views):
-            frames.rgb[row], frames.depth[row], frames.segmentation[row] = self._eye().render(graph.pose(view))
+            pose = graph.pose(view)
+            frame = camera.render(pose)
+            if not np.isfinite(frame.depth).all():
+                frame = camera.render(pose._replace(x=pose.x + ASIDE_M[0], z=pose.z + ASIDE_M[1]))
+            frames.rgb[row], frames.depth[row], frames.segmentation[row] = frame
         return frames
 
     def _eye(self) -> "Camera":

@@ -40,7 +40,7 @@ DEFAULT_PICTURE_SIZE: Final = 84
 Progress = Callable[[int, int], None]
 """Called with the number of views done and the number of all views."""
 
-_PICTURE_SOURCES: Final = ("../nav/pose.py", "world.py", "camera.py", "pose_graph.py")
+_PICTURE_SOURCES: Final = ("../nav/pose.py", "world.py", "camera.py", "painter.py", "pose_graph.py")
 _DERIVED_SOURCES: Final = ("../nav/episode.py", "../nav/categories.py", "detections.py", "appearance.py")
 
 
