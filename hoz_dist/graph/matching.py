@@ -7,8 +7,6 @@ from numpy.typing import NDArray
 
 ALPHA: Final = 0.1
 """Keeps the distance of zones with nothing in common finite [Eq. 3]."""
-_SAME_NUMBER_BONUS: Final = 1e-9
-"""Lets zones of equal weight keep their numbers, whatever the solver would do."""
 
 
 def distance(a: NDArray[np.floating], b: NDArray[np.floating]) -> NDArray[np.float64]:
@@ -39,5 +37,5 @@ def match(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.int64]:
     from scipy.optimize import linear_sum_assignment  # noqa: PLC0415 - clients that only plan start without SciPy
 
     weights = 1.0 / distance(a[:, None], b[None])  # [K, K]
-    _, matched = linear_sum_assignment(weights + _SAME_NUMBER_BONUS * np.eye(len(a)), maximize=True)
+    _, matched = linear_sum_assignment(weights, maximize=True)
     return matched.astype(np.int64)

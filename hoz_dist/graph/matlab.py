@@ -4,11 +4,8 @@ import io
 from pathlib import Path
 from typing import Any, Final
 
-import numpy as np
-from numpy.typing import NDArray
-
 from hoz_dist.errors import InvalidValueError
-from hoz_dist.graph.checks import MAX_CATEGORIES, MAX_ZONES
+from hoz_dist.graph.mat5 import read_mat5
 from hoz_dist.graph.scene_graph import SceneGraph
 from hoz_dist.nav.categories import SCENES, TARGETS
 
@@ -45,22 +42,11 @@ def from_matlab(content: bytes, scene: str) -> SceneGraph:
     Raises:
         InvalidValueError: The content is not that of a scene graph; the message says what is wrong.
     """
-    from scipy.io import loadmat, whosmat  # noqa: PLC0415 - clients start without SciPy
-
-    file: Any = io.BytesIO(content)
-    try:
-        # Sizes first, so that a hostile file is not unpacked.
-        shapes = {name: shape for name, shape, kind in whosmat(file) if kind == "double"}
-        tables = {}
-        if all(max(shapes.get(name, (np.inf,))) <= max(MAX_ZONES, MAX_CATEGORIES) for name in _TABLES):
-            tables = loadmat(file, variable_names=list(_TABLES))
-    except Exception as error:  # SciPy's reader raises nearly anything on damaged files
-        message = "It is not a MATLAB 5 file, or it is damaged."
-        raise InvalidValueError(message) from error
+    tables = read_mat5(content)
     if not all(name in tables for name in _TABLES):
-        message = "It must hold the tables 'node_features' and 'edges' of doubles."
+        message = "It must hold the tables 'node_features' and 'edges' of real doubles."
         raise InvalidValueError(message)
-    nodes, edges = (_plain_array(tables[name]) for name in _TABLES)
+    nodes, edges = (tables[name] for name in _TABLES)
     return SceneGraph(scene=scene, version=0, rooms=(), categories=TARGETS, nodes=nodes, edges=edges)
 
 
@@ -72,15 +58,3 @@ def scene_of_file(path: Path) -> str:
     """
     letters = path.stem.lower().rstrip("s").translate(str.maketrans("", "", "_- "))
     return next((scene for scene in SCENES if scene.replace("_", "") == letters), path.stem)
-
-
-def _plain_array(table: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return a table in the machine's byte order and row by row.
-
-    Raises:
-        InvalidValueError: It holds complex numbers.
-    """
-    if not np.isrealobj(table):
-        message = "Its numbers must be real."
-        raise InvalidValueError(message)
-    return np.ascontiguousarray(table, dtype=np.float64)

@@ -20,6 +20,15 @@ def test_walk_depends_on_the_name_of_the_room_alone() -> None:
     assert not np.array_equal(first, explore(room.transitions, "kitchen/4"))
 
 
+def test_rooms_are_turned_around_in_either_direction() -> None:
+    room = open_floor(3, 3)
+    turns = set()
+    for number in range(1, 21):
+        first, second = explore(room.transitions, f"kitchen/{number}", budget=1)
+        turns.add(int(np.flatnonzero(room.transitions[first] == second)[0]))
+    assert turns == {Action.ROTATE_LEFT, Action.ROTATE_RIGHT}
+
+
 def test_agent_looks_all_around_before_it_leaves() -> None:
     room = open_floor(3, 3)
     views_per_position = len(YAWS) * len(PITCHES)

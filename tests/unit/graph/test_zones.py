@@ -48,6 +48,13 @@ def test_clear_clusters_are_found() -> None:
     assert len({(int(a), int(b)) for a, b in zip(truth, labels, strict=True)}) == 4
 
 
+def test_zones_are_those_of_the_views_not_of_the_distinct_bags() -> None:
+    # Bags 0, 1 and 3 objects apart: distinct bags would pair the first two, but nearly all views have these.
+    bags = np.repeat(np.array([[0, 0, 0, 0], [1, 0, 0, 0], [1, 1, 1, 0]], dtype=np.bool_), [100, 100, 1], axis=0)
+    labels = cluster(Views(bags, np.zeros((201, 2), dtype=np.int16)), 2, 0)
+    assert labels[0] != labels[100] == labels[200]
+
+
 def test_one_bag_everywhere_is_split_by_position() -> None:
     positions = np.stack(np.meshgrid(np.arange(8), np.arange(2)), axis=-1).reshape(-1, 2).astype(np.int16)
     labels = cluster(Views(np.ones((16, 22), dtype=np.bool_), positions), 2, 0)
