@@ -97,12 +97,18 @@ class RunConfig:
         if not isinstance(values, dict) or set(values) != set(known):
             given = set(values) if isinstance(values, dict) else set()
             wrong = sorted(str(name) for name in given ^ set(known))
-            message = f"Not a configuration of this version of hoz-dist; missing or unknown: {', '.join(wrong) or 'all'}."
+            message = (
+                f"Not a configuration of this version of hoz-dist; missing or unknown: {', '.join(wrong) or 'all'}."
+            )
             raise InvalidValueError(message)
         for name, value in values.items():
             default = known[name].default
             optional = name in {"minutes", "frames"}
-            expected = (float, int) if isinstance(default, float) or name == "minutes" else (int if optional else type(default))
+            expected = (
+                (float, int)
+                if isinstance(default, float) or name == "minutes"
+                else (int if optional else type(default))
+            )
             if isinstance(value, bool) or not (isinstance(value, expected) or (optional and value is None)):
                 message = f"'{name}' of the configuration is {value!r}, which is of the wrong type."
                 raise InvalidValueError(message)

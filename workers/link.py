@@ -18,6 +18,7 @@ from hoz_dist.nav.categories import TARGETS
 from hoz_dist.nav.episode import EpisodeResult
 from hoz_dist.nav.rooms import RoomId
 from hoz_dist.wire.discovery import find_run
+from hoz_dist.wire.graphs import scene_graph_of
 from hoz_dist.wire.keys import Keys
 from hoz_dist.wire.liveliness import Member, declare_alive
 from hoz_dist.wire.messages import (
@@ -94,9 +95,11 @@ class LearnerLink:
 
     def scene_graphs(self) -> dict[str, SceneGraph]:
         """Return the newest scene graphs that were heard of, by scene."""
-        return {graph.scene: _scene_graph(graph) for graph in self._graphs.newest.values()}
+        return {graph.scene: scene_graph_of(graph) for graph in self._graphs.newest.values()}
 
-    def push_gradient(self, gradient: NDArray[np.float32], frames: int, computed_on: tuple[int, int]) -> Accepted | Refused:
+    def push_gradient(
+        self, gradient: NDArray[np.float32], frames: int, computed_on: tuple[int, int]
+    ) -> Accepted | Refused:
         """Push a gradient.
 
         Args:
@@ -153,14 +156,3 @@ class LearnerLink:
     def _next(self, kind: type[Push]) -> int:
         self._sequences[kind] += 1
         return self._sequences[kind] - 1
-
-
-def _scene_graph(reply: SceneGraphReply) -> SceneGraph:
-    return SceneGraph(
-        scene=reply.scene,
-        version=reply.version,
-        rooms=tuple(map(str, reply.rooms)),
-        categories=reply.categories,
-        nodes=reply.nodes,
-        edges=reply.edges,
-    )

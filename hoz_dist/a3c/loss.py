@@ -43,8 +43,8 @@ def a3c_loss(
 ) -> Loss:
     """Compute the loss of a rollout, averaged over its valid steps.
 
-    Advantages are divided by their standard deviation in the rollout: success comes rarely at first and often later, and
-    the entropy bonus keeps its meaning against either.
+    Advantages are divided by their standard deviation in the rollout: success comes rarely at first and often later,
+    and the entropy bonus keeps its meaning against either.
 
     Args:
         rollout: T steps of B episodes.

@@ -13,7 +13,8 @@ def generalized_advantages(rollout: Rollout, discount: float, gae_lambda: float)
         \delta_t = r_t + \gamma (1 - \text{terminated}_t) V_{t+1} - V_t, \quad
         A_t = \delta_t + \gamma \lambda (1 - \text{ended}_t) A_{t+1}
 
-    A truncated episode's last value is bootstrapped: with NEXT_STEP autoreset, V_{t+1} is the value of its last observation.
+    A truncated episode's last value is bootstrapped: with NEXT_STEP autoreset, V_{t+1} is the value of its last
+    observation.
 
     Args:
         rollout: T steps of B episodes.

@@ -9,8 +9,8 @@ from torch import Tensor
 class Rollout:
     """T steps of B episodes under one behaviour policy.
 
-    Episodes follow each other with NEXT_STEP autoreset: after the step that ends an episode comes one whose action is ignored
-    (``valid`` is False), at which a truncated episode's last observation is seen.
+    Episodes follow each other with NEXT_STEP autoreset: after the step that ends an episode comes one whose action is
+    ignored (``valid`` is False), at which a truncated episode's last observation is seen.
     """
 
     actions: Tensor

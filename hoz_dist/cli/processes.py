@@ -1,7 +1,7 @@
 """Child processes of `hoz-dist train`: started, watched, restarted when killed, stopped together."""
 
-import ctypes
 import logging
+import os
 import signal
 import subprocess
 import sys
@@ -18,8 +18,6 @@ STOP_S: Final = 20.0
 """How long a process may take to stop cleanly before it is killed, seconds."""
 MOST_RESTARTS: Final = 5
 """Restarts of one process; one that dies again and again has another reason than a passing one."""
-_PR_SET_PDEATHSIG: Final = 1
-"""Linux's prctl option: the signal that a process gets when its parent dies."""
 
 
 class Child:
@@ -83,14 +81,13 @@ class Child:
     def _start(self) -> subprocess.Popen[bytes]:
         with self.log.open("ab") as output:
             return subprocess.Popen(  # noqa: S603 - our own command
-                [sys.executable, "-m", "hoz_dist.cli.main", *self._arguments],
+                [sys.executable, "-m", "hoz_dist.cli.child", str(os.getpid()), *self._arguments],
                 stdin=subprocess.DEVNULL,
                 stdout=output,
                 stderr=subprocess.STDOUT,
                 env=child_environment(),
                 # Ctrl-C reaches this process alone, which then stops its children in order.
                 start_new_session=True,
-                preexec_fn=_die_with_parent if sys.platform == "linux" else None,
             )
 
 
@@ -118,8 +115,3 @@ class Children:
         for child in reversed(self._children):
             child.terminate()
             child.wait()
-
-
-def _die_with_parent() -> None:
-    """Ask Linux to stop this process when the one that started it dies, however it dies."""
-    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)

@@ -66,9 +66,9 @@ def _draw_trajectories(measurement: Measurement, path: Path, seed: int) -> Path:
     for scene in benchmark.scenes:
         # Longer episodes show more of the search.
         of_scene = [episode for episode in benchmark.episodes if episode.room.scene == scene]
-        chosen += sorted(of_scene, key=lambda episode: -episode.optimal)[: len(of_scene) // 2][:: max(1, len(of_scene) // 4)][
-            :_DRAWN_PER_SCENE
-        ]
+        chosen += sorted(of_scene, key=lambda episode: -episode.optimal)[: len(of_scene) // 2][
+            :: max(1, len(of_scene) // 4)
+        ][:_DRAWN_PER_SCENE]
     results, ways = trace_episodes(measurement.agent, benchmark.rooms, chosen, seed)
     graphs = {views.room: views.graph for views in benchmark.rooms}
     draw_trajectories(

@@ -60,8 +60,8 @@ def train_command(
 ) -> None:
     """Train on this machine, then measure the agent on unseen validation rooms and draw pictures.
 
-    Starts one learner and some actors, which find each other over Zenoh on a loopback port. Ctrl-C stops them cleanly; the
-    same command then goes on where the run was.
+    Starts one learner and some actors, which find each other over Zenoh on a loopback port. Ctrl-C stops them cleanly;
+    the same command then goes on where the run was.
     """
     from hoz_dist.cli.launch import launch
     from hoz_dist.cli.report import report

@@ -19,9 +19,7 @@ from hoz_dist.sim.room_views import RoomViews
 from hoz_dist.sim.view_store import ViewStore
 
 
-def load_agent(
-    config: RunConfig, parameters: NDArray[np.float32], graphs: Mapping[str, SceneGraph]
-) -> PolicyAgent:
+def load_agent(config: RunConfig, parameters: NDArray[np.float32], graphs: Mapping[str, SceneGraph]) -> PolicyAgent:
     """Make the agent that a checkpoint holds.
 
     Args:
@@ -53,9 +51,7 @@ def matching_encoder(config: RunConfig, weights: Path | None) -> VisualEncoder:
     """
     encoder = load_encoder(config.encoder, weights)
     if encoder.key != config.encoder_key:
-        message = (
-            f"The run was trained with encoder {config.encoder_key}, not {encoder.key}; give the same file to --weights."
-        )
+        message = f"The run's encoder is {config.encoder_key}, not {encoder.key}; give the same file to --weights."
         raise InvalidValueError(message)
     return encoder
 

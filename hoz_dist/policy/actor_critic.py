@@ -1,8 +1,8 @@
 """The actor-critic network of all methods: what acts, and what a rollout's gradient is computed through.
 
-One network serves `a3c`, `object` and `hoz`; `PolicySettings` switches the layers. Acting goes step by step and decides
-which scene, zone and sub-goal to use (`act`); training goes over a whole rollout at once with those decisions given, as it
-goes with the actions given (`unroll`).
+One network serves `a3c`, `object` and `hoz`; `PolicySettings` switches the layers. Acting goes step by step and
+decides which scene, zone and sub-goal to use (`act`); training goes over a whole rollout at once with those decisions
+given, as it goes with the actions given (`unroll`).
 """
 
 from typing import NamedTuple
@@ -24,8 +24,8 @@ from hoz_dist.policy.trunks import make_trunk
 MOVE_BIAS = 1.5
 """Bias of the other actions' logits over Done's at the start.
 
-Done at once is a local optimum: it costs one step, wandering costs many. With the done reminder it is hard to leave, since
-Done's logit is 0 while the target is not seen and cannot be pushed down. So training starts where Done is rare.
+Done at once is a local optimum: it costs one step, wandering costs many. With the done reminder it is hard to leave,
+since Done's logit is 0 while the target is not seen and cannot be pushed down. So training starts where Done is rare.
 """
 
 
@@ -165,7 +165,8 @@ class ActorCritic(nn.Module):
         scene_logits = self._scene_logits(picture, inputs)
         embedding = None
         if self.zone_layer is not None:
-            nodes = self._nodes_over_time(inputs.bag.view(steps, batch, -1), state.zone, guidance, bank)
+            bags = inputs.bag.view(steps, batch, -1)
+            nodes = self._nodes_over_time(self.zone_layer, bags, state.zone, guidance, bank)
             rows = bank.adjacency[guidance.scene.flatten(), guidance.subgoal.flatten()]
             embedding = self.zone_layer(nodes.flatten(0, 1), rows)
         joined = self._join(inputs, picture, scene_logits, embedding)
@@ -182,16 +183,17 @@ class ActorCritic(nn.Module):
             return None
         return self.scene_layer(self.trunk.summary(picture), inputs.confidence)  # type: ignore[no-any-return]
 
-    def _nodes_over_time(self, bags: Tensor, zone: ZoneState, guidance: Guidance, bank: GraphBank) -> Tensor:
+    def _nodes_over_time(
+        self, layer: ZoneLayer, bags: Tensor, zone: ZoneState, guidance: Guidance, bank: GraphBank
+    ) -> Tensor:
         """Return delta_t of every step, [T, B, K, N]; the gradient reaches lambda."""
-        assert self.zone_layer is not None
         nodes, over_time = zone.nodes, []
         chosen = functional.one_hot(guidance.current, self.zones).float()
         for t in range(len(bags)):
             fresh = guidance.fresh[t]
             if fresh.any():
                 nodes = torch.where(fresh[:, None, None], bank.nodes[guidance.scene[t]], nodes)
-            nodes = self.zone_layer.update(nodes, bags[t], chosen[t])
+            nodes = layer.update(nodes, bags[t], chosen[t])
             over_time.append(nodes)
         return torch.stack(over_time)
 

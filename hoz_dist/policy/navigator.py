@@ -79,8 +79,8 @@ def guide(
 ) -> tuple[ZoneState, Guidance]:
     """Look, find the current zone, update the local graph, and plan.
 
-    The scene is the one that the scene layer's log-probabilities, summed over the episode's views, favour among the scenes
-    whose graph is known: one view of a bare wall tells little. When it changes, the graph is copied anew.
+    The scene is the one that the scene layer's log-probabilities, summed over the episode's views, favour among the
+    scenes whose graph is known: one view of a bare wall tells little. When it changes, the graph is copied anew.
 
     Args:
         layer: Holds lambda.
@@ -88,7 +88,8 @@ def guide(
         state: State after the step before.
         bag: f_t, [B, N].
         target: One-hot target indicator, [B, N].
-        scene_logits: Logits of the scene layer, [B, S]; None when it is switched off, then the first known graph is used.
+        scene_logits: Logits of the scene layer, [B, S]; None when it is switched off: then the first known graph is
+            used.
         first: Whether the episode begins, [B].
 
     Returns:

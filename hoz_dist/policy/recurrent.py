@@ -18,9 +18,11 @@ class EpisodicLSTM(nn.Module):
         self.recurrent_gates = nn.ParameterList(
             nn.Parameter(nn.init.orthogonal_(torch.empty(4 * cells, cells))) for _ in range(layers)
         )
-        for gates in self.input_gates:
-            nn.init.zeros_(gates.bias)  # type: ignore[arg-type]
-            gates.bias.data[cells : 2 * cells] = 1.0  # type: ignore[index, union-attr] # remember by default
+        with torch.no_grad():
+            for layer in self.input_gates:
+                bias = layer.get_parameter("bias")
+                bias.zero_()
+                bias[cells : 2 * cells] = 1.0  # remember by default
 
     def initial_state(self, batch: int) -> Tensor:
         """Return the zero state, [2, layers, B, cells]: outputs and cells."""

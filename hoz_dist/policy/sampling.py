@@ -8,7 +8,8 @@ from torch import Tensor
 def sample_actions(logits: Tensor, rng: np.random.Generator) -> Tensor:
     """Draw an action for each episode from the softmax of its logits.
 
-    By the Gumbel-max trick with NumPy's generator, so that one seed gives the same actions whatever torch does elsewhere.
+    By the Gumbel-max trick with NumPy's generator, so that one seed gives the same actions whatever torch does
+    elsewhere.
 
     Args:
         logits: [B, actions].

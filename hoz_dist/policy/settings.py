@@ -30,9 +30,7 @@ class Sizes:
 
 
 PRESETS: Final[dict[Preset, Sizes]] = {
-    "compact": Sizes(
-        trunk="vector", picture=64, target=16, action=8, objects=16, zones=32, lstm=128, lstm_layers=1
-    ),
+    "compact": Sizes(trunk="vector", picture=64, target=16, action=8, objects=16, zones=32, lstm=128, lstm_layers=1),
     # 49 object features: H_o' f^v then has one row per cell of the 7 x 7 grid, as in the released code.
     "paper": Sizes(trunk="grid", picture=64, target=10, action=10, objects=49, zones=10, lstm=512, lstm_layers=2),
 }

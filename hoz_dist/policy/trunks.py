@@ -21,7 +21,7 @@ class VectorTrunk(nn.Module):
 
     def see(self, features: Tensor) -> Tensor:
         """Map feature grids [B, C, G, G] to picture features [B, F]."""
-        return functional.relu(self.picture(features.flatten(1)))  # type: ignore[no-any-return]
+        return functional.relu(self.picture(features.flatten(1)))
 
     def summary(self, picture: Tensor) -> Tensor:
         """Return what the scene layer sees of the picture, [B, F]."""
@@ -60,7 +60,7 @@ class GridTrunk(nn.Module):
 
     def see(self, features: Tensor) -> Tensor:
         """Map feature grids [B, C, G, G] to picture features [B, G * G, F]; a pointwise convolution."""
-        return functional.relu(self.picture(features.flatten(2).transpose(1, 2)))  # type: ignore[no-any-return]
+        return functional.relu(self.picture(features.flatten(2).transpose(1, 2)))
 
     def summary(self, picture: Tensor) -> Tensor:
         """Return what the scene layer sees of the picture, [B, F]."""

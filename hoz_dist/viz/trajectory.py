@@ -69,10 +69,8 @@ def _draw(axis: Axes, trajectory: Trajectory) -> None:
     axis.plot(x[0], z[0], "o", color="black", markersize=7, zorder=6)
     axis.plot(x[-1], z[-1], "*", color="tab:green" if result.success else "tab:red", markersize=15, zorder=7)
     ending = "found" if result.success else ("wrong Done" if result.said_done else "time ran out")
-    axis.set_title(
-        f"{trajectory.agent}: {target} in {room.room}\n{ending} after {result.actions} actions (optimal {result.optimal})",
-        fontsize=9,
-    )
+    outcome = f"{ending} after {result.actions} actions (optimal {result.optimal})"
+    axis.set_title(f"{trajectory.agent}: {target} in {room.room}\n{outcome}", fontsize=9)
     axis.set_xlim(-0.1, room.width + 0.1)
     axis.set_ylim(-0.1, room.depth + 0.1)
     axis.set_aspect("equal")

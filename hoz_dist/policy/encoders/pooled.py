@@ -13,8 +13,8 @@ NEAREST_M: Final = 0.3
 class PooledEncoder:
     """Averages colour and inverse depth over the cells of a 7 x 7 grid.
 
-    Channels: red, green, blue (mean, centred on 0), inverse depth (mean and largest: how near the nearest surface in the
-    cell is), and the spread of brightness (texture: small objects change it when they hardly change the mean).
+    Channels: red, green, blue (mean, centred on 0), inverse depth (mean and largest: how near the nearest surface in
+    the cell is), and the spread of brightness (texture: small objects change it when they hardly change the mean).
     """
 
     key: Final = "pooled-1-g7"
@@ -29,7 +29,7 @@ class PooledEncoder:
         counts = np.diff(np.append(edges, side)).astype(np.float32)
         area = counts[:, None] * counts[None, :]
 
-        def mean(values: NDArray[np.float32]) -> NDArray[np.float32]:  # [M, side, side, ...] -> [M, G, G, ...]
+        def mean(values: NDArray[np.floating]) -> NDArray[np.float32]:  # [M, side, side, ...] -> [M, G, G, ...]
             sums = np.add.reduceat(np.add.reduceat(values, edges, axis=1), edges, axis=2)
             return np.asarray(sums / area.reshape(1, GRID, GRID, *([1] * (values.ndim - 3))), dtype=np.float32)
 

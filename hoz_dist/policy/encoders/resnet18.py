@@ -1,4 +1,7 @@
-"""ResNet-18 feature maps, 512 x 7 x 7, as in the paper. Needs torchvision (`pip install hoz-dist[resnet]`) and weights."""
+"""ResNet-18 feature maps, 512 x 7 x 7, as in the paper.
+
+Needs torchvision (`pip install hoz-dist[resnet]`) and a file with its weights.
+"""
 
 import hashlib
 from pathlib import Path
@@ -46,7 +49,7 @@ class ResNet18Encoder:
         try:
             from torchvision.models import resnet18  # noqa: PLC0415 # an optional extra
         except (ImportError, RuntimeError) as error:  # RuntimeError: torchvision built for another torch
-            message = f"The resnet18 encoder needs torchvision that fits this torch: pip install 'hoz-dist[resnet]' ({error})."
+            message = f"The resnet18 encoder needs torchvision: pip install 'hoz-dist[resnet]' ({error})."
             raise HozError(message) from error
         network = resnet18(weights=None)
         state = _read(weights)
@@ -65,11 +68,11 @@ class ResNet18Encoder:
         del depth
         mean, deviation = torch.tensor(_MEAN).view(1, 3, 1, 1), torch.tensor(_DEVIATION).view(1, 3, 1, 1)
         grids = []
-        for chunk in torch.from_numpy(np.ascontiguousarray(rgb)).split(CHUNK):
+        for chunk in torch.split(torch.from_numpy(np.ascontiguousarray(rgb)), CHUNK):
             pictures = chunk.permute(0, 3, 1, 2).float() / 255
             scaled = functional.interpolate(pictures, size=PICTURE_SIZE, mode="bilinear", align_corners=False)
             grids.append(self._network((scaled - mean) / deviation).half())
-        return torch.cat(grids).numpy()  # type: ignore[no-any-return]
+        return torch.cat(grids).numpy()
 
 
 def _read(weights: Path) -> dict[str, Tensor]:
@@ -84,4 +87,4 @@ def _read(weights: Path) -> dict[str, Tensor]:
     except Exception as error:  # safetensors and torch raise a dozen kinds for a file that is not theirs
         message = f"{weights} cannot be read as weights; give the .safetensors or .pth file that torchvision publishes."
         raise DamagedFileError(message) from error
-    return state  # type: ignore[no-any-return]
+    return state

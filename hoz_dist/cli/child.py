@@ -1,0 +1,29 @@
+"""`hoz-dist` as a child of `hoz-dist train`: the same command, but it stops when its parent dies, however it dies."""
+
+import ctypes
+import os
+import signal
+import sys
+from typing import Final
+
+from hoz_dist.cli.main import main
+
+_PR_SET_PDEATHSIG: Final = 1
+"""Linux's prctl option: the signal that a process gets when its parent dies."""
+
+
+def die_with_parent(parent: int) -> None:
+    """Ask Linux to stop this process when its parent dies; elsewhere a killed parent leaves it running.
+
+    Args:
+        parent: Process id of the parent, which may have died already.
+    """
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
+        if os.getppid() != parent:
+            sys.exit(1)
+
+
+if __name__ == "__main__":
+    die_with_parent(int(sys.argv.pop(1)))
+    main()
