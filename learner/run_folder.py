@@ -12,7 +12,7 @@ from filelock import FileLock, Timeout
 from hoz_dist.config import RunConfig
 from hoz_dist.errors import DamagedFileError, HozError, InvalidValueError, NotFoundError, RunMismatchError
 from learner.checkpoint import FOLDER, Checkpoint, checkpoint_files, load_checkpoint
-from learner.files import replace_file
+from learner.files import TEMPORARY_SUFFIX, replace_file
 
 CONFIG_FILE: Final = "config.json"
 LOCK_FILE: Final = "learner.lock"
@@ -102,8 +102,8 @@ def _refuse_foreign(path: Path) -> None:
     if not path.is_dir():
         message = f"'{path}' is a file; choose a folder for the run."
         raise InvalidValueError(message)
-    # The lock alone is what a learner leaves that was killed before it wrote the configuration.
-    names = {entry.name for entry in path.iterdir()} - {LOCK_FILE}
+    # These are what a learner leaves that was killed before it had written the configuration.
+    names = {entry.name for entry in path.iterdir()} - {LOCK_FILE, CONFIG_FILE + TEMPORARY_SUFFIX}
     if names and CONFIG_FILE not in names:
         message = f"'{path}' holds files but is not a run; choose an empty or a new folder."
         raise InvalidValueError(message)

@@ -81,8 +81,9 @@ def test_a_second_learner_is_kept_out_while_the_first_runs(tmp_path: Path) -> No
         assert folder.epoch == 2
 
 
-def test_the_lock_alone_does_not_make_a_folder_foreign(tmp_path: Path) -> None:
-    (tmp_path / "learner.lock").touch()
+def test_what_a_killed_learner_left_does_not_make_a_folder_foreign(tmp_path: Path) -> None:
+    for name in ("learner.lock", "config.json.tmp"):
+        (tmp_path / name).touch()
     with open_run_folder(tmp_path, CONFIG) as folder:
         assert folder.epoch == 1
 

@@ -1,0 +1,61 @@
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
+
+from learner.core import LearnerCore
+from learner.events import EpisodesReceived
+from learner.recorder import ScalarRecorder, UpdateLog
+from learner.replay import UpdateRecord, read_updates
+from tests.unit.learner.making import CONFIG, answer, episodes, gradient, push, vector
+
+
+def record(sequence: int) -> UpdateRecord:
+    return UpdateRecord("a", 1, sequence, sequence, 0, 0.1)
+
+
+def write(path: Path, version: int, *records: UpdateRecord) -> None:
+    log = UpdateLog(path, version)
+    for item in records:
+        log.write(item)
+    log.close()
+
+
+def test_updates_that_a_killed_learner_lost_are_cut_off(tmp_path: Path) -> None:
+    path = tmp_path / "updates.jsonl"
+    write(path, 0, *map(record, range(5)))
+    with path.open("a") as file:
+        file.write(record(5).to_line()[:-20])  # it was killed in the middle of a line
+    write(path, 3, record(77))
+    assert read_updates(path) == [record(0), record(1), record(2), record(77)]
+
+
+def test_a_record_that_was_deleted_begins_again(tmp_path: Path) -> None:
+    path = tmp_path / "updates.jsonl"
+    write(path, 9, record(9))
+    assert read_updates(path) == [record(9)]
+
+
+def test_scalars_are_logged_over_frames(tmp_path: Path) -> None:
+    core = LearnerCore(replace(CONFIG, frames=100), vector(0))
+    scalars = ScalarRecorder(tmp_path, core.statistics.frames)
+    scalars.record(core.status(0.0))
+    answer(core, EpisodesReceived(0, episodes(0, ("kitchen/1", True), ("bathroom/1", False))))
+    push(core, *(gradient(sequence, version=0) for sequence in range(3)))
+    scalars.record(core.status(1.0))
+    scalars.close()
+    events = EventAccumulator(str(tmp_path)).Reload()
+
+    def last(tag: str) -> tuple[int, float]:
+        event = events.Scalars(tag)[-1]
+        return event.step, event.value
+
+    assert last("n_frames") == (30, 30.0)
+    assert last("success/train") == (30, 0.5)
+    assert last("success_kitchen/train") == (30, 1.0)
+    assert last("train/version_diff_min") == (30, 0.0)
+    assert last("train/version_diff_avg") == (30, 1.0)
+    assert last("train/version_diff_max") == (30, 2.0)
+    assert last("train/learning_rate")[1] == pytest.approx(0.008)
+    assert last("perf/_fps") == (30, 30.0)
