@@ -2,16 +2,18 @@
 
 import logging
 from types import TracebackType
-from typing import NamedTuple, Self
+from typing import Final, NamedTuple, Self
 
 import zenoh
 from zenoh import LivelinessToken, Session
 from zenoh.handlers import FifoChannel
 
 from hoz_dist.wire.draining import Drain
-from hoz_dist.wire.keys import Keys, check_name
+from hoz_dist.wire.keys import NAME_PATTERN, Keys, check_name
 
 _log = logging.getLogger(__name__)
+MOST_MEMBERS: Final = 4096
+"""So many are watched; invented tokens cannot fill the memory, or make the status too long to travel."""
 
 
 class Member(NamedTuple):
@@ -65,7 +67,12 @@ class Members:
 
     def _follow(self, change: zenoh.Sample) -> None:
         role, name = str(change.key_expr).split("/")[-2:]
+        if not (NAME_PATTERN.fullmatch(role) and NAME_PATTERN.fullmatch(name)):
+            return  # a stranger's token: none of our processes has such a name
         if change.kind == zenoh.SampleKind.PUT:
+            if len(self._members) >= MOST_MEMBERS:
+                _log.warning("%s %s is not watched: there are %d members already", role, name, MOST_MEMBERS)
+                return
             self._members |= {Member(role, name)}
             _log.info("%s %s joined", role, name)
         else:

@@ -396,6 +396,17 @@ def test_members_are_the_holders_of_live_tokens(endpoint: str) -> None:
         assert until(lambda: members.current() == ())
 
 
+def test_tokens_with_strange_names_are_ignored(endpoint: str) -> None:
+    with (
+        samples.serving(endpoint) as (_, session),
+        Members(session, KEYS) as members,
+        open_client(endpoint) as stranger,
+    ):
+        strange = stranger.liveliness().declare_token(f"hoz/{KEYS.run}/alive/actor/a b;c")
+        with strange, declare_alive(stranger, KEYS, Member("actor", "a0")):
+            assert until(lambda: members.current() == (("actor", "a0"),))
+
+
 # --- parameters and graphs ---
 
 
