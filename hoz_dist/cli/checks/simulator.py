@@ -11,7 +11,7 @@ import numpy as np
 
 from hoz_dist.cli.checks.finding import Finding
 from hoz_dist.cli.checks.machine import GIB
-from hoz_dist.errors import DamagedFileError
+from hoz_dist.errors import DamagedFileError, HozError
 from hoz_dist.nav.pose import Pose
 from hoz_dist.nav.rooms import RoomId
 from hoz_dist.sim.camera import Camera
@@ -29,8 +29,11 @@ _ROOM_FOLDER: Final = re.compile(r"[a-z_]+-[0-9]+-[0-9a-f]{16}")
 
 
 def check_rendering() -> Finding:
-    """Load a room into PyBullet and draw it."""
-    room = load_room(RoomId("kitchen", 1))
+    """Make a room, load it into PyBullet and draw it."""
+    try:
+        room = load_room(RoomId("kitchen", 1))
+    except HozError as error:
+        return Finding("rendering", "fail", str(error).rstrip("."))
     with World(room) as world:
         camera = Camera(world)
         start = time.perf_counter()
