@@ -23,6 +23,7 @@ import platformdirs
 from numpy.typing import NDArray
 
 from hoz_dist.errors import DamagedFileError, InvalidValueError
+from hoz_dist.nav.categories import SCENE_TARGETS, category_index
 from hoz_dist.nav.encoder import VisualEncoder
 from hoz_dist.nav.rooms import RoomId
 from hoz_dist.sim.appearance import appearance
@@ -98,7 +99,9 @@ class ViewStore:
                     arrays = folder.load_derived(name)
         if arrays is None:
             raise _unwritable(self._cache, "what was written could not be read back")
-        targets = tuple(np.flatnonzero(arrays["success"].any(axis=0)).tolist())
+        # A room may hold objects that are targets of other scenes only, such as a chair in a bathroom.
+        asked_for = {category_index(category) for category in SCENE_TARGETS[room.scene]}
+        targets = tuple(target for target in sorted(asked_for) if arrays["success"][:, target].any())
         return RoomViews(room=room, digest=content.digest, graph=folder.graph, targets=targets, **arrays)
 
     def frames(self, room: RoomId, views: NDArray[np.integer] | None = None) -> Frames:

@@ -13,6 +13,7 @@ import pytest
 from hoz_dist.errors import HozError
 from hoz_dist.nav.categories import category_index
 from hoz_dist.nav.pose import Pose
+from hoz_dist.nav.rooms import RoomId
 from hoz_dist.sim.camera import Camera
 from hoz_dist.sim.room_views import RoomViews
 from hoz_dist.sim.view_store import default_cache
@@ -71,6 +72,12 @@ def test_views_show_the_room_as_it_is(whole: RoomViews) -> None:
     assert whole.targets == (CHAIR, FRIDGE)
     assert whole.bag[near, FRIDGE]
     assert not whole.bag[behind, FRIDGE]
+
+
+def test_targets_are_those_that_the_scene_asks_for(tmp_path: Path) -> None:
+    living_room = small_store(tmp_path).open(RoomId("living_room", 1), TinyEncoder())
+    assert living_room.targets == (CHAIR,)
+    assert living_room.bag[:, FRIDGE].any()
 
 
 def test_frames_are_the_cameras(tmp_path: Path) -> None:

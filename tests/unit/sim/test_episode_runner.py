@@ -47,6 +47,10 @@ def test_every_episode_counts_in_the_order_of_the_list() -> None:
             runner.results()
         runner.step(np.where(step >= stop_at, int(Action.DONE), int(Action.ROTATE_LEFT)))
         assert runner.active.tolist() == [step < at and step < 19 for at in stop_at]
+    last = [Action.DONE if at < 20 else Action.ROTATE_LEFT for at in stop_at]
+    assert runner.observe().previous_action.tolist() == last
+    runner.step(np.full(12, int(Action.LOOK_DOWN)))
+    assert runner.observe().previous_action.tolist() == last
     results = runner.results()
     assert [result.actions for result in results] == [min(at + 1, 20) for at in stop_at]
     assert [result.said_done for result in results] == [bool(at < 20) for at in stop_at]

@@ -52,6 +52,9 @@ def test_the_list_follows_from_rooms_and_seed() -> None:
     assert episode_list(ROOMS[::-1], 40, 7) == episodes
     assert episode_list(ROOMS, 50, 7)[:40] == episodes
     assert episode_list(ROOMS, 40, 8) != episodes
+    same_content = random_views(RoomId("kitchen", 24), seed=21)
+    one, other = (episode_list([views], 40, 7) for views in (ROOMS[0], same_content))
+    assert [episode[1:] for episode in one] != [episode[1:] for episode in other]
     assert {episode.room for episode in episodes} == {views.room for views in ROOMS}
 
 
