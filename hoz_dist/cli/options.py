@@ -25,6 +25,8 @@ picture_size_option = click.option(
 
 json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON for scripts.")
 
+force_option = click.option("--force", is_flag=True, help="Replace the output file if it exists. Default: refuse.")
+
 
 def echo_json(value: Any) -> None:
     """Print a value as JSON on standard output."""

@@ -1,5 +1,6 @@
 """Fills the view cache with several processes at once, and draws contact sheets of rooms."""
 
+import io
 import multiprocessing
 import signal
 from collections.abc import Iterable, Sequence
@@ -75,17 +76,18 @@ def render_rooms(rooms: Sequence[RoomId], cache: Path, picture_size: int, jobs: 
             worker.join()
 
 
-def write_contact_sheet(rooms: Iterable[RoomId], store: ViewStore, output: Path) -> None:
-    """Write a picture with one row for each room: from places all over it, the level view that shows most items.
+def contact_sheet(rooms: Iterable[RoomId], store: ViewStore) -> bytes:
+    """Draw a picture with one row for each room: from places all over it, the level view that shows most items.
 
     Args:
         rooms: The rooms.
         store: The view cache; what it lacks is rendered.
-        output: The PNG file to write.
+
+    Returns:
+        The content of a PNG file.
 
     Raises:
         HozError: The cache cannot be written.
-        OSError: The file cannot be written.
     """
     from matplotlib.image import imsave
 
@@ -99,7 +101,9 @@ def write_contact_sheet(rooms: Iterable[RoomId], store: ViewStore, output: Path)
         best = np.arange(len(items)) * len(YAWS) + items.argmax(axis=1)
         gap = ((0, 0), (0, _SHEET_GAP), (0, _SHEET_GAP), (0, 0))
         rows.append(np.concatenate(list(np.pad(frames.rgb[best], gap, constant_values=255)), axis=1))
-    imsave(output, np.concatenate(rows, axis=0))
+    file = io.BytesIO()
+    imsave(file, np.concatenate(rows, axis=0), format="png")
+    return file.getvalue()
 
 
 def _render(tasks: "SimpleQueue[RoomId | None]", reports: "Queue[_Report]", cache: Path, picture_size: int) -> None:

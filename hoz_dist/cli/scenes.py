@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from hoz_dist.cli.options import cache_option, echo_json, json_option, picture_size_option
+from hoz_dist.cli.options import cache_option, echo_json, force_option, json_option, picture_size_option
 from hoz_dist.nav.categories import SCENE_TARGETS, SCENES, TARGETS
 from hoz_dist.nav.rooms import SPLITS, RoomId, Split, rooms_of
 
@@ -76,22 +76,33 @@ def show_command(room: str, *, as_json: bool) -> None:
     type=click.Path(dir_okay=False, path_type=Path),
     help="Also write a picture (PNG) with some views of each room.",
 )
+@force_option
 def render_command(
-    names: tuple[str, ...], split: Split, picture_size: int, jobs: int, cache: Path | None, output: Path | None
+    names: tuple[str, ...],
+    split: Split,
+    picture_size: int,
+    jobs: int,
+    cache: Path | None,
+    output: Path | None,
+    *,
+    force: bool,
 ) -> None:
     """Render all views of rooms into the view cache, so that training and evaluation need not wait for them.
 
     Views that are there already are kept.
     """
     rooms = list(dict.fromkeys(room for name in names for room in _rooms(name, split)))
-    from hoz_dist.cli.rendering import render_rooms, write_contact_sheet
+    from hoz_dist.cli.rendering import contact_sheet, render_rooms
+    from hoz_dist.graph.atomic import check_writable, write_atomically
     from hoz_dist.sim.view_store import ViewStore, default_cache
 
+    if output is not None:
+        check_writable(output, overwrite=force)  # before minutes of work, not after
     folder = cache or default_cache()
     views = render_rooms(rooms, folder, picture_size, jobs)
     click.echo(f"The cache {folder} holds all {views:,} views of {len(rooms)} room{'s' * (len(rooms) != 1)}.")
     if output is not None:
-        write_contact_sheet(rooms, ViewStore(folder, picture_size), output)
+        write_atomically(output, contact_sheet(rooms, ViewStore(folder, picture_size)), overwrite=force)
         click.echo(f"Wrote {output}.")
 
 

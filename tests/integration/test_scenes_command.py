@@ -40,7 +40,9 @@ def test_render_fills_the_cache_and_draws_a_contact_sheet(tmp_path: Path, capsys
     assert "100%" in first.err
     assert matplotlib.image.imread(sheet).shape[:2] == (2 * (24 + 2), 8 * (24 + 2))
 
-    # What is there is kept: nothing is written any more.
+    # The picture is not replaced unasked; what is in the cache is kept.
+    assert run([*command, "--output", str(sheet)]) == 2
+    assert str(sheet) in capsys.readouterr().err
     before = {file: file.stat().st_mtime_ns for file in cache.rglob("*.npy")}
     assert run(command) == 0
     assert {file: file.stat().st_mtime_ns for file in cache.rglob("*.npy")} == before
