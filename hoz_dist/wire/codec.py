@@ -26,6 +26,7 @@ from hoz_dist.wire.messages import (
     StatusReply,
 )
 from hoz_dist.wire.rejection import Reason, RejectedError
+from hoz_dist.wire.schema import MOST_CHARACTERS, MOST_ELEMENTS
 
 PROTOCOL_VERSION: Final = 1
 MESSAGES: Final[dict[str, type[Message]]] = {
@@ -47,15 +48,18 @@ MESSAGES: Final[dict[str, type[Message]]] = {
     )
 }
 """Every message by its kind."""
-_MOST_ELEMENTS: Final = 4096
-"""Longest list or map that msgpack may build; each field's own limit is at most this."""
+_SPARE: Final = 16 * 1024
+"""Room for all but the tensors in the buffer that a message is packed into; it grows when that is not enough."""
 
 M = TypeVar("M", bound=Message)
 
 
 def encode(message: Message) -> bytes:
     """Return the bytes of a message."""
-    packed: bytes = msgpack.packb({"v": PROTOCOL_VERSION, "kind": message.KIND, **message.pack()})
+    fields = {"v": PROTOCOL_VERSION, "kind": message.KIND, **message.pack()}
+    bulk = sum(_tensor_bytes(value) for value in fields.values())
+    # A buffer that has to grow copies a large tensor several times.
+    packed: bytes = msgpack.Packer(buf_size=bulk + _SPARE).pack(fields)
     return packed
 
 
@@ -89,13 +93,19 @@ def checksum(data: bytes) -> bytes:
     return xxhash.xxh3_64_digest(data)
 
 
+def _tensor_bytes(packed: object) -> int:
+    """Return the length of the raw bytes of a packed field; 0 when it is no tensor."""
+    data = packed.get("data") if isinstance(packed, dict) else None
+    return data.nbytes if isinstance(data, memoryview) else 0
+
+
 def _unpack_map(data: bytes) -> dict[object, object]:
     try:
         fields = msgpack.unpackb(
             data,
-            max_str_len=_MOST_ELEMENTS,
-            max_array_len=_MOST_ELEMENTS,
-            max_map_len=_MOST_ELEMENTS,
+            max_str_len=4 * MOST_CHARACTERS,  # bytes; a character of UTF-8 has up to four
+            max_array_len=MOST_ELEMENTS,
+            max_map_len=MOST_ELEMENTS,
             max_bin_len=len(data),
             max_ext_len=0,
         )

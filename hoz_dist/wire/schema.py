@@ -18,6 +18,10 @@ from numpy.typing import NDArray
 from hoz_dist.wire.rejection import Reason, RejectedError
 
 MAX_INT: Final = 2**63 - 1
+MOST_ELEMENTS: Final = 4096
+"""Longest list or map anywhere in a message; a field's own limit is at most this."""
+MOST_CHARACTERS: Final = 4096
+"""Longest text anywhere in a message; a field's own limit is at most this."""
 DTYPES: Final[Mapping[str, np.dtype[Any]]] = {"float32": np.dtype("<f4"), "float64": np.dtype("<f8")}
 """Element types by their name on the wire; always little-endian."""
 
@@ -252,6 +256,8 @@ class JsonObject(Scalar):
         if levels < 0:
             raise RejectedError(Reason.SIZE, f"{where} is nested too deep")
         match value:
+            case dict() | list() if len(value) > MOST_ELEMENTS:
+                raise RejectedError(Reason.SIZE, f"{where} has {len(value)} elements, more than {MOST_ELEMENTS}")
             case dict():
                 for name, element in value.items():
                     Text(128).check(name, f"a name in {where}")
@@ -261,7 +267,9 @@ class JsonObject(Scalar):
                     self._check_any(element, where, levels - 1)
             case float() if not math.isfinite(value):
                 raise RejectedError(Reason.NONFINITE, f"{where} is {value}")
-            case None | bool() | int() | float() | str():
+            case str():
+                Text(MOST_CHARACTERS).check(value, where)
+            case None | bool() | int() | float():
                 pass
             case _:
                 raise _wrong_type(where, "a JSON value", value)

@@ -475,6 +475,18 @@ def test_parameters_never_run_backwards_but_a_new_epoch_may_begin_lower(learner:
         assert follower.fetch(timeout_s=WAIT_S).head.stamp == (3, 4)
 
 
+def test_a_follower_hears_of_the_new_epoch_of_a_restarted_learner(endpoint: str) -> None:
+    with samples.serving(endpoint) as (_, session), ParametersPublisher(session, KEYS) as publisher:
+        client = open_client(endpoint)
+        follower = ParametersFollower(client, KEYS, threading.Event())
+        publisher.publish(1, 7, np.zeros(3, np.float32))
+        assert until(lambda: follower.newest is not None)
+    with client, follower, samples.serving(endpoint) as (_, session), ParametersPublisher(session, KEYS) as publisher:
+        publisher.publish(2, 3, np.ones(3, np.float32))
+        assert until(lambda: follower.newest is not None and follower.newest.stamp == (2, 3))
+        np.testing.assert_array_equal(follower.fetch((2, 0), WAIT_S).vector, np.ones(3))
+
+
 def test_graphs_are_published_when_they_change(learner: Server, client: Session) -> None:
     with NewestSubscriber(client, KEYS.graph("*"), SceneGraphReply) as graphs:
         learner.put_graph(samples.scene_graph(version=1))

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hoz_dist.wire.codec import MESSAGES, PROTOCOL_VERSION, checksum, decode, encode
-from hoz_dist.wire.messages import Accepted, EpisodesPush, GradientPush, Message, RoomGraphPush
+from hoz_dist.wire.messages import Accepted, ConfigReply, EpisodesPush, GradientPush, Message, Refused, RoomGraphPush
 from hoz_dist.wire.rejection import Reason, RejectedError
 from tests import wire_samples as samples
 
@@ -190,6 +190,29 @@ def test_a_long_list_is_rejected() -> None:
     many = [list(samples.EPISODE)] * 5000
     many = [[str(samples.ROOM), *row[1:]] for row in many]
     assert reason_of(altered(samples.MESSAGES[1], episodes=many), EpisodesPush) == Reason.MALFORMED
+
+
+CONFIG = samples.config_reply()
+
+
+@pytest.mark.parametrize(
+    ("config", "reason"),
+    [
+        ([], Reason.TYPE),
+        ({"a": b"bytes"}, Reason.TYPE),
+        ({"a": float("nan")}, Reason.NONFINITE),
+        ({"a": {"b": {"c": {"d": {"e": 1}}}}}, Reason.SIZE),
+        ({"a" * 129: 1}, Reason.SIZE),
+        ({"a": "x" * 4097}, Reason.SIZE),
+    ],
+)
+def test_what_is_wrong_with_a_configuration_has_a_name(config: object, reason: Reason) -> None:
+    assert reason_of(altered(CONFIG, config=config), ConfigReply) == reason
+
+
+def test_the_longest_text_of_any_script_survives() -> None:
+    detail = "\N{GRINNING FACE}" * 2048
+    assert decode(encode(Refused("stale", detail)), Refused).detail == detail
 
 
 def test_invalid_messages_cannot_be_made_to_be_sent() -> None:
