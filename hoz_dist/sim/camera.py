@@ -15,8 +15,8 @@ NEAR_M: Final = 0.05
 FAR_M: Final = 20.0
 _LIGHT_DIRECTION: Final = (1.0, -2.0, 3.0)
 """Towards the light, (x, z, height); oblique, so that the faces of a box differ."""
-_AMBIENT: Final = 0.62
-_DIFFUSE: Final = 0.42
+_AMBIENT: Final = 0.7
+_DIFFUSE: Final = 0.36
 
 
 class Frame(NamedTuple):

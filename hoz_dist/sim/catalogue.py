@@ -37,14 +37,15 @@ def load_room(room: RoomId) -> Room:
     """
     entry = _read_catalogue().get(str(room))
     if entry is None:
-        raise NotFoundError(f"Room {room} is not in the catalogue of rooms; use one that `hoz-dist scenes list` names.")
+        message = f"Room {room} is not in the catalogue of rooms; use one that `hoz-dist scenes list` names."
+        raise NotFoundError(message)
     made = generate_room(room, entry.attempt)
     if made.digest != entry.digest:
-        raise RoomDiffersError(
+        message = (
             f"Room {room} comes out differently on this machine than in the catalogue (digest {made.digest}, not "
-            f"{entry.digest}), so results would not compare; reinstall hoz-dist, or remake the catalogue with "
-            f"`python -m hoz_dist.sim.validation`."
+            f"{entry.digest}), so results would not compare; reinstall hoz-dist."
         )
+        raise RoomDiffersError(message)
     return made
 
 
@@ -61,4 +62,5 @@ def _read_catalogue() -> dict[str, Entry]:
         content = json.loads(CATALOGUE_PATH.read_text(encoding="utf-8"))
         return {name: Entry(attempt=entry["attempt"], digest=entry["digest"]) for name, entry in content.items()}
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        raise DamagedFileError("The catalogue of rooms cannot be read; reinstall hoz-dist.") from error
+        message = "The catalogue of rooms cannot be read; reinstall hoz-dist."
+        raise DamagedFileError(message) from error

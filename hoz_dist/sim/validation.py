@@ -10,8 +10,10 @@ from random import Random
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hoz_dist.nav.categories import SCENE_TARGETS, SCENES, TARGETS
+from hoz_dist.nav.episode import SUCCESS_DISTANCE_M
 from hoz_dist.nav.pose import GRID_M
 from hoz_dist.nav.rooms import SPLITS, RoomId
 from hoz_dist.sim.camera import Camera
@@ -87,13 +89,13 @@ def _hidden_targets(world: World, graph: PoseGraph) -> list[str]:
     return [TARGETS[index] for index in wanted if counts[index] < LEAST_SUCCESS_VIEWS]
 
 
-def _is_near(room: Room, place: np.ndarray, categories: set[int]) -> bool:
+def _is_near(room: Room, place: NDArray[np.float64], categories: set[int]) -> bool:
     """Say whether an instance of one of the categories is close enough to a place to succeed from there."""
     names = {TARGETS[index] for index in categories}
     for item in room.items:
         if item.category in names:
             gap = np.maximum(np.array(item.low[:2]) - place, place - np.array(item.high[:2])).clip(min=0.0)
-            if np.hypot(*gap) <= 1.5:
+            if np.hypot(*gap) <= SUCCESS_DISTANCE_M:
                 return True
     return False
 
@@ -110,7 +112,8 @@ def accept(room: RoomId) -> Entry:
         if fault is None:
             return Entry(attempt, made.digest)
         sys.stdout.write(f"{room} attempt {attempt}: {fault}\n")
-    raise RuntimeError(f"No attempt to generate {room} was accepted.")
+    message = f"No attempt to generate {room} was accepted."
+    raise RuntimeError(message)
 
 
 def main() -> None:

@@ -17,10 +17,10 @@ _FURNISH: Final[dict[str, Callable[[FloorPlan], None]]] = {
     "bathroom": bathroom.furnish,
 }
 _EXTENTS: Final[dict[str, tuple[tuple[int, int], tuple[int, int]]]] = {
-    "kitchen": ((3500, 4900), (3600, 5100)),
-    "living_room": ((5000, 7800), (4500, 6800)),
-    "bedroom": ((4000, 6000), (3900, 5800)),
-    "bathroom": ((2500, 4200), (2800, 4200)),
+    "kitchen": ((3100, 4800), (3300, 5000)),
+    "living_room": ((4800, 7200), (4400, 6400)),
+    "bedroom": ((4000, 5500), (3900, 5500)),
+    "bathroom": ((2300, 3700), (2500, 4000)),
 }
 """Least and greatest inner extents of the walls, mm: the field's reachable extents and about 1 m of furniture."""
 _FLOORS: Final[dict[str, tuple[str, ...]]] = {
@@ -46,7 +46,8 @@ def generate_room(room: RoomId, attempt: int) -> Room:
         depth=rng.randrange(least_depth, most_depth, 10),
         height=rng.randrange(2400, 2800, 10),
     )
-    tiles = rng.choice((90, 1200)) if room.scene == "bathroom" else 90
-    walls = shell(plan, rng.choice(_FLOORS[room.scene]), band=tiles)
+    tiles = rng.choice((0, 1200)) if room.scene == "bathroom" else 0
+    walls = shell(plan, rng.choice(_FLOORS[room.scene]), tiles=tiles)
     _FURNISH[room.scene](plan)
-    return Room(room, plan.width / 1000, plan.depth / 1000, (walls, *plan.items))
+    # The walls come last: PyBullet draws in this order and spends no time on what is hidden by things drawn before.
+    return Room(room, plan.width / 1000, plan.depth / 1000, (*plan.items, walls))

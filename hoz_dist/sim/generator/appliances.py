@@ -1,12 +1,12 @@
 """Kitchen appliances and the worktops that they stand on."""
 
+from dataclasses import dataclass
 from random import Random
-from typing import Final
+from typing import Final, Self
 
 from hoz_dist.sim.generator.palette import Colour, paint, shade
 from hoz_dist.sim.generator.solids import Model, Rect, Solid, Spot, Top, box, cylinder, vary
 
-WORKTOP_DEPTH: Final = 640
 _TOE: Final = 90
 """Height of the recess under a cabinet."""
 _SLAB: Final = 40
@@ -18,15 +18,20 @@ _OVERHANG: Final = 40
 _DARK: Final[Colour] = (0.1, 0.1, 0.1)
 
 
+@dataclass(frozen=True)
 class CabinetStyle:
-    """What the cabinets of one kitchen share."""
+    """What the cabinets of one room share."""
 
-    def __init__(self, rng: Random) -> None:
-        """Draw colours and the height of the worktops."""
-        self.body = paint(rng, "cabinet")
-        self.top = paint(rng, "worktop")
-        self.height = vary(rng, 920, 3)
-        self.depth = vary(rng, WORKTOP_DEPTH, 4)
+    body: Colour
+    top: Colour
+    height: int
+    """Of the worktops."""
+    depth: int
+
+    @classmethod
+    def draw(cls, rng: Random, height: int = 920, depth: int = 640) -> Self:
+        """Draw colours, and measures around the given ones."""
+        return cls(paint(rng, "cabinet"), paint(rng, "worktop"), vary(rng, height, 3), vary(rng, depth, 4))
 
 
 def counter(style: CabinetStyle, width: int) -> Model:
@@ -87,8 +92,8 @@ def sink(rng: Random, width: int, depth: int) -> Model:
             box((-half, -half + wall), (wall, depth - wall), (10, rim), shade(colour, 90)),
             box((half - wall, half), (wall, depth - wall), (10, rim), shade(colour, 90)),
             box((-25, 25), (middle - 25, middle + 25), (10, 14), _DARK),
-            box((-18, 18), (-60, -24), (BASIN_DEPTH, BASIN_DEPTH + 240), tap),
-            box((-14, 14), (-24, 130), (BASIN_DEPTH + 205, BASIN_DEPTH + 235), tap),
+            box((-18, 18), (-60, -24), (BASIN_DEPTH, BASIN_DEPTH + 210), tap),
+            box((-14, 14), (-24, 130), (BASIN_DEPTH + 180, BASIN_DEPTH + 208), tap),
             box((30, 60), (-54, -30), (BASIN_DEPTH, BASIN_DEPTH + 60), tap),
         ],
     )
@@ -97,7 +102,7 @@ def sink(rng: Random, width: int, depth: int) -> Model:
 def _carcass(style: CabinetStyle, x: tuple[int, int], top: int) -> list[Solid]:
     """The cabinet under a worktop: recess, body and doors."""
     depth = style.depth - _OVERHANG
-    count = max(1, min(4, (x[1] - x[0] + 250) // 500))
+    count = max(1, min(3, (x[1] - x[0] + 250) // 650))
     step = (x[1] - x[0]) // count
     doors = [
         box(
@@ -118,7 +123,7 @@ def _carcass(style: CabinetStyle, x: tuple[int, int], top: int) -> list[Solid]:
 def wall_cabinet(style: CabinetStyle, width: int) -> Model:
     """A cupboard that hangs over a worktop."""
     half, depth, height = width // 2, 330, 700
-    count = max(1, min(4, (width + 200) // 450))
+    count = max(1, min(3, (width + 200) // 600))
     step = width // count
     doors = [
         box(
@@ -168,13 +173,10 @@ def burner(rng: Random, diameter: int) -> Model:
     """A gas ring; a pot or pan stands on it."""
     colour = paint(rng, "black")
     half = diameter // 2
-    arms = [
-        box((-half, half), (half - 12, half + 12), (8, 22), shade(colour, 160)),
-        box((-12, 12), (0, half - 12), (8, 22), shade(colour, 160)),
-        box((-12, 12), (half + 12, diameter), (8, 22), shade(colour, 160)),
-    ]
-    plate = box((-half + 15, half - 15), (15, diameter - 15), (0, 8), colour)
-    return Model.of("StoveBurner", [plate, *arms], Top(Rect(-170, -70, 170, diameter + 300), 22))
+    cap = half // 2
+    plate = box((-half, half), (0, diameter), (0, 10), colour)
+    ring = box((-cap, cap), (half - cap, half + cap), (10, 22), shade(colour, 180))
+    return Model.of("StoveBurner", [plate, ring], Top(plate.rect, 22, centred=True))
 
 
 def hood(rng: Random, width: int) -> Model:
@@ -191,7 +193,7 @@ def hood(rng: Random, width: int) -> Model:
 
 def fridge(rng: Random) -> Model:
     """A refrigerator with a freezer."""
-    width, depth, height = vary(rng, 880, 15), vary(rng, 700, 6), vary(rng, 1800, 7)
+    width, depth, height = vary(rng, 940, 12), vary(rng, 720, 5), vary(rng, 1830, 6)
     colour = paint(rng, "appliance")
     half, split = width // 2, height * rng.choice((35, 40, 65, 70)) // 100
     front = depth - 50
@@ -211,7 +213,7 @@ def fridge(rng: Random) -> Model:
 
 def microwave(rng: Random) -> Model:
     """A microwave oven: body, window and control panel."""
-    width, depth, height = vary(rng, 560, 12), vary(rng, 360, 10), vary(rng, 330, 10)
+    width, depth, height = vary(rng, 590, 12), vary(rng, 360, 10), vary(rng, 340, 10)
     half, panel = width // 2, width // 4
     body = paint(rng, "appliance")
     return Model.of(
@@ -227,7 +229,7 @@ def microwave(rng: Random) -> Model:
 
 def toaster(rng: Random) -> Model:
     """A toaster with two slots and a lever."""
-    width, depth, height = vary(rng, 310, 12), vary(rng, 210, 10), vary(rng, 205, 10)
+    width, depth, height = vary(rng, 330, 12), vary(rng, 220, 10), vary(rng, 205, 10)
     half, colour = width // 2, paint(rng, "toaster")
     slots = [box((-half + 40, half - 40), (z, z + 30), (height - 4, height), _DARK) for z in (50, depth - 80)]
     body = box((-half, half), (0, depth), (15, height - 4), colour)
@@ -238,7 +240,7 @@ def toaster(rng: Random) -> Model:
 
 def coffee_machine(rng: Random) -> Model:
     """A coffee machine: tank at the back, head above, and a jug on the plate."""
-    width, depth, height = vary(rng, 340, 15), vary(rng, 380, 12), vary(rng, 420, 10)
+    width, depth, height = vary(rng, 390, 15), vary(rng, 410, 10), vary(rng, 430, 10)
     half, colour = width // 2, paint(rng, "coffee_machine")
     tank = depth * 2 // 5
     jug_height = height // 3

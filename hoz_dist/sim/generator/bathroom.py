@@ -13,7 +13,7 @@ def furnish(plan: FloorPlan) -> None:
     """Furnish a bathroom."""
     rng = plan.rng
     entrance(plan, tuple(plan.any_walls()))
-    bathing = rng.choices(("tub", "shower", "both"), (50, 38, 12))[0]
+    bathing = rng.choices(("tub", "shower", "both"), (50, 32, 18))[0]
     if bathing in {"tub", "both"}:
         plan.against_wall(bathroom_fixtures.bathtub(rng), plan.any_walls(), access=600, margin=10)
     _washing_place(plan)
@@ -21,8 +21,9 @@ def furnish(plan: FloorPlan) -> None:
     if bathing in {"shower", "both"}:
         plan.against_wall(bathroom_fixtures.shower(rng), plan.any_walls(), access=600, margin=10)
     plan.against_wall(small_things.garbage_can(rng), plan.any_walls(), access=250, margin=40)
-    if rng.random() < 0.5:
-        plan.against_wall(bathroom_fixtures.bathroom_shelf(rng), plan.any_walls(), access=500)
+    for make, chance in ((bathroom_fixtures.bathroom_shelf, 65), (bathroom_fixtures.hamper, 60)):
+        if rng.randrange(100) < chance:
+            plan.against_wall(make(rng), plan.any_walls(), access=450)
     windows(plan, rng.randint(0, 1), curtains=rng.random() < 0.2)
     for _ in range(rng.randint(1, 2)):
         plan.against_wall(bathroom_fixtures.towel_rail(rng), plan.any_walls(), height=rng.randint(900, 1100))
@@ -41,12 +42,11 @@ def _washing_place(plan: FloorPlan) -> None:
         if placed:
             plan.at(_mirror(rng, placed.model.width), placed.spot._replace(height=1150), margin=0)
         return
-    style = appliances.CabinetStyle(rng)
-    style.height, style.depth = rng.randrange(820, 900, 2), rng.randrange(530, 590, 2)
+    style = appliances.CabinetStyle.draw(rng, height=860, depth=560)
     basin = appliances.sink(rng, 520, 360)
     width = basin.width + rng.randrange(160, 400, 2)
     unit = appliances.sink_counter(style, width, basin)
-    twin = plan.rng.random() < 0.25
+    twin = rng.random() < 0.25
     placed = plan.against_wall(unit, plan.any_walls(), access=600, margin=20)
     while placed:
         plan.add(basin, appliances.basin_spot(style, basin, placed.spot))

@@ -125,6 +125,19 @@ def bathroom_shelf(rng: Random) -> Model:
     )
 
 
+def hamper(rng: Random) -> Model:
+    """A basket for laundry."""
+    half, depth, height = vary(rng, 440) // 2, vary(rng, 360), vary(rng, 600)
+    colour = paint(rng, "wood")
+    return Model.of(
+        "LaundryHamper",
+        [
+            box((-half, half), (0, depth), (0, height - 50), colour),
+            box((-half - 10, half + 10), (0, depth + 10), (height - 50, height), shade(colour, 80)),
+        ],
+    )
+
+
 def toilet_roll(rng: Random) -> Model:
     """A roll on a holder, for the wall."""
     return Model.of(

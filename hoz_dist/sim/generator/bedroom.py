@@ -14,18 +14,26 @@ def furnish(plan: FloorPlan) -> None:
     _bed(plan)
     if rng.random() < 0.9:
         workplace(plan)
-    for make, chance in ((tables.wardrobe, 70), (tables.dresser, 75), (tables.shelf, 35), (seating.arm_chair, 25)):
+    for make, chance in (
+        (tables.wardrobe, 90),
+        (tables.dresser, 88),
+        (seating.arm_chair, 60),
+        (tables.shelf, 60),
+        (tables.dresser, 25),
+    ):
         if rng.randrange(100) < chance:
-            plan.against_wall(make(rng), plan.any_walls(), access=700)
+            plan.against_wall(make(rng), plan.any_walls(), access=450)
     if not plan.has("Chair") and rng.random() < 0.8:
         plan.against_wall(seating.chair(rng), plan.any_walls(), access=400)
     if rng.random() < 0.3:
         plan.against_wall(small_things.floor_lamp(rng), plan.any_walls(), access=300)
     plan.against_wall(small_things.garbage_can(rng), plan.any_walls(), access=300)
+    if rng.random() < 0.4:
+        plan.on_floor(seating.ottoman(rng), 500)
     windows(plan, rng.randint(1, 2), curtains=rng.random() < 0.8)
     _small_things(plan)
     pictures(plan, rng.randint(0, 3))
-    if rng.random() < 0.3:
+    for _ in range(rng.randint(0, 2)):
         plan.against_wall(small_things.plant(rng), plan.any_walls())
     if rng.random() < 0.6:
         free_rug(plan, 1700, 1100)
@@ -34,7 +42,7 @@ def furnish(plan: FloorPlan) -> None:
 def _bed(plan: FloorPlan) -> None:
     """Place the bed, its head at a wall, with a table on one side or both."""
     rng = plan.rng
-    model = seating.bed(rng, rng.choice((950, 1400, 1550, 1650)))
+    model = seating.bed(rng, rng.choice((1000, 1400, 1500, 1600, 1700)))
     for wall in plan.any_walls():
         length = plan.wall_length(wall)
         room = model.width // 2
@@ -44,18 +52,22 @@ def _bed(plan: FloorPlan) -> None:
             left = along - room
             right = length - along - room
             sides = [sign for sign, free in ((-1, left), (1, right)) if free >= 1150]
-            if (0 < left < 600 and left > 30) or (600 > right > 30) or not sides or not plan.fits(model, spot, 20):
+            # A gap too narrow to walk in looks odd and is a pocket.
+            if any(30 < free < 600 for free in (left, right)) or not sides or not plan.fits(model, spot, 20):
                 continue
             bed = plan.add(model, spot)
             rng.shuffle(sides)
             for index, sign in enumerate(sides):
                 if index == 0 or rng.random() < 0.7:
                     _bedside(plan, bed, sign)
+            if rng.random() < 0.4:
+                bench = seating.bench(rng, model.width * 3 // 4 // 2 * 2)
+                x, z = spot.point(0, model.depth + 40)
+                plan.at(bench, Spot(x, z, 0, wall))
             rect = model.rect
-            way = Rect(
-                rect.x0 - 700 * (-1 in sides), 450, rect.x1 + 700 * (1 in sides), min(rect.z1 + 700, rect.z1 + 10**6)
+            plan.keep_free(
+                spot.rect(Rect(rect.x0 - 700 * (-1 in sides), 450, rect.x1 + 700 * (1 in sides), rect.z1 + 650))
             )
-            plan.keep_free(spot.rect(way))
             return
 
 
@@ -71,7 +83,7 @@ def _small_things(plan: FloorPlan) -> None:
     """Put things where they are used (shares of receptacles after the field's statistics)."""
     rng = plan.rng
     if rng.random() < 0.35:
-        plan.put(small_things.television(rng, on_wall=False), {"Dresser": 100})
+        plan.put(small_things.television(rng, 800, on_wall=False), {"Dresser": 100})
     for make, chance, places, turn in (
         (small_things.alarm_clock, 92, {"SideTable": 68, "Dresser": 14, "Desk": 18}, False),
         (small_things.desk_lamp, 92, {"SideTable": 55, "Desk": 28, "Dresser": 17}, False),

@@ -15,11 +15,10 @@ def dining_set(plan: FloorPlan, chairs: int) -> Placed | None:
     """
     rng = plan.rng
     free_standing = rng.random() < 0.6
-    for percent in (100, 85, 70, 58):
+    for percent in (100, 90, 80, 70, 60):
         model = dining_table(rng, percent)
-        table = plan.on_floor(model, 750) if free_standing else None
-        table = table or plan.against_wall(model, plan.any_walls(), access=800, margin=700)
-        table = table or plan.on_floor(model, 700)
+        table = plan.on_floor(model, 700) if free_standing else None
+        table = table or plan.against_wall(model, plan.any_walls(), access=700, margin=600)
         if table:
             chairs_at(plan, table, chairs)
             return table
@@ -40,7 +39,7 @@ def chairs_at(plan: FloorPlan, table: Placed, count: int, *, front_only: bool = 
     area = table.model.rect
     middle = (area.z0 + area.z1) // 2
     long_side = [area.x0 // 2, area.x1 // 2] if area.x1 - area.x0 > 1150 else [0]
-    sides = [(2, x) for x in long_side] + [(0, x) for x in long_side] + [(1, middle), (3, middle)]
+    sides = [*((side, x) for side in (2, 0) for x in long_side), (1, middle), (3, middle)]
     if front_only:
         sides = [(2, x) for x in range(area.x0 + 250, area.x1 - 240, 50)]
     rng.shuffle(sides)
@@ -48,11 +47,12 @@ def chairs_at(plan: FloorPlan, table: Placed, count: int, *, front_only: bool = 
     for side, along in sides:
         if placed == count:
             return
-        out = model.depth - rng.randint(60, 260)
-        spot = _seat_spot(table, side, along, out)
-        if plan.fits(model, spot, 5, on_ways=front_only):
-            plan.add(model, spot)
-            placed += 1
+        for tucked in sorted(rng.sample(range(40, 340), 3)):
+            spot = _seat_spot(table, side, along, model.depth - tucked)
+            if plan.fits(model, spot, 5, on_ways=True):
+                plan.add(model, spot)
+                placed += 1
+                break
 
 
 def _seat_spot(table: Placed, side: int, along: int, out: int) -> Spot:

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping
 from random import Random
 from typing import Final, NamedTuple
 
-from hoz_dist.sim.generator.solids import Model, Placed, Rect, Spot
+from hoz_dist.sim.generator.solids import Model, Placed, Rect, Spot, Top
 from hoz_dist.sim.room import Item
 
 WALLS: Final = (0, 1, 2, 3)
@@ -25,7 +25,7 @@ class Surface(NamedTuple):
     owner: Placed
     rect: Rect
     height: int
-    clear: int
+    top: Top
 
 
 class FloorPlan:
@@ -177,7 +177,7 @@ class FloorPlan:
     def surfaces(self, category: str) -> list[Surface]:
         """Return the surfaces of the placed objects of a category."""
         return [
-            Surface(owner, owner.spot.rect(top.rect), owner.spot.height + top.height, top.clear)
+            Surface(owner, owner.spot.rect(top.rect), owner.spot.height + top.height, top)
             for owner in self.placed
             if owner.category == category
             for top in owner.model.tops
@@ -208,17 +208,35 @@ class FloorPlan:
 
     def put_on(self, model: Model, surface: Surface, *, turn: bool = False) -> Placed | None:
         """Put a thing at a random free place of a surface, or return None."""
-        if model.height > surface.clear:
+        if model.height > surface.top.clear:
             return None
-        area = surface.rect
         for _ in range(_TRIES):
             quarter = self.rng.choice(WALLS) if turn else surface.owner.spot.quarter
-            origin = Spot(0, 0, 0, quarter).rect(model.rect)
-            x0, x1 = area.x0 - origin.x0, area.x1 - origin.x1
-            z0, z1 = area.z0 - origin.z0, area.z1 - origin.z1
-            if x0 > x1 or z0 > z1:
-                continue
-            spot = Spot(self.rng.randint(x0, x1), self.rng.randint(z0, z1), surface.height, quarter)
-            if self.fits(model, spot, _GAP):
+            spot = (
+                self._middle(model, surface, quarter) if surface.top.centred else self._place(model, surface, quarter)
+            )
+            if spot and self.fits(model, spot, _GAP):
                 return self.add(model, spot)
         return None
+
+    def _place(self, model: Model, surface: Surface, quarter: int) -> Spot | None:
+        """Draw a spot where a thing lies within a surface, often at its ends; None if the thing is too large."""
+        origin, area = Spot(0, 0, 0, quarter).rect(model.rect), surface.rect
+        x0, x1 = area.x0 - origin.x0, area.x1 - origin.x1
+        z0, z1 = area.z0 - origin.z0, area.z1 - origin.z1
+        if x0 > x1 or z0 > z1:
+            return None
+        x, z = self.rng.randint(x0, x1), self.rng.randint(z0, z1)
+        # Things of a small table would shut each other out if all of them stood in its middle.
+        end = self.rng.randrange(4)
+        if surface.owner.spot.quarter % 2 == 0:
+            x = (x0, x1, x, x)[end]
+        else:
+            z = (z0, z1, z, z)[end]
+        return Spot(x, z, surface.height, quarter)
+
+    def _middle(self, model: Model, surface: Surface, quarter: int) -> Spot:
+        """Return the spot where the middle of a thing's lowest part is over the middle of a surface."""
+        foot, area = Spot(0, 0, 0, quarter).rect(model.solids[0].rect), surface.rect
+        x, z = (area.x0 + area.x1 - foot.x0 - foot.x1) // 2, (area.z0 + area.z1 - foot.z0 - foot.z1) // 2
+        return Spot(x, z, surface.height, quarter)

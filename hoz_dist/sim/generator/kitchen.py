@@ -6,7 +6,7 @@ from hoz_dist.sim.generator import appliances, small_things
 from hoz_dist.sim.generator.appliances import CabinetStyle
 from hoz_dist.sim.generator.dining import dining_set
 from hoz_dist.sim.generator.floor_plan import FloorPlan
-from hoz_dist.sim.generator.seating import stool
+from hoz_dist.sim.generator.seating import chair, stool
 from hoz_dist.sim.generator.shell import entrance, free_rug, pictures, window, windows
 from hoz_dist.sim.generator.solids import Model, Rect, Spot
 
@@ -29,7 +29,7 @@ class _Run(NamedTuple):
 def furnish(plan: FloorPlan) -> None:
     """Furnish a kitchen."""
     rng = plan.rng
-    style = CabinetStyle(rng)
+    style = CabinetStyle.draw(rng)
     runs = _runs(plan, style)
     _fill_runs(plan, style, runs)
     used = {run.wall for run in runs}
@@ -39,7 +39,9 @@ def furnish(plan: FloorPlan) -> None:
         if plan.on_floor(model, 800):
             _stools(plan)
     if rng.random() < 0.9:
-        dining_set(plan, rng.choice((2, 2, 3, 3, 4)))
+        dining_set(plan, rng.choice((2, 3, 4, 4, 4)))
+    if not plan.has("Chair") and rng.random() < 0.5:
+        plan.against_wall(chair(rng), plan.any_walls(), access=400)
     plan.against_wall(small_things.garbage_can(rng), plan.any_walls(), access=300)
     if not plan.has("Window") or rng.random() < 0.4:
         windows(plan, 1, curtains=rng.random() < 0.3)

@@ -18,18 +18,26 @@ def furnish(plan: FloorPlan) -> None:
     rng = plan.rng
     entrance(plan, tuple(plan.any_walls()))
     _television_corner(plan)
-    if rng.random() < 0.7:
-        dining_set(plan, rng.choice((2, 3, 4)))
+    if rng.random() < 0.92:
+        dining_set(plan, rng.choice((2, 3, 4, 4, 5)))
     if rng.random() < 0.5 or not plan.has("Chair"):
         workplace(plan)
-    for make, chance in ((tables.shelf, 60), (tables.dresser, 50), (seating.arm_chair, 60), (tables.side_table, 50)):
+    for make, chance in (
+        (tables.shelf, 75),
+        (tables.dresser, 80),
+        (seating.arm_chair, 55),
+        (tables.side_table, 80),
+        (tables.shelf, 40),
+    ):
         if rng.randrange(100) < chance:
-            plan.against_wall(make(rng), plan.any_walls(), access=_WAY)
+            plan.against_wall(make(rng), plan.any_walls(), access=450)
     if rng.randrange(100) < 92:
-        plan.against_wall(small_things.floor_lamp(rng), plan.any_walls(), access=300)
+        plan.against_wall(small_things.floor_lamp(rng), plan.any_walls(), access=200)
     plan.against_wall(small_things.garbage_can(rng), plan.any_walls(), access=300)
-    for _ in range(rng.randint(0, 2)):
+    for _ in range(rng.randint(1, 3)):
         plan.against_wall(small_things.plant(rng), plan.any_walls())
+    if rng.random() < 0.35:
+        plan.on_floor(seating.ottoman(rng), 500)
     windows(plan, rng.randint(1, 3), curtains=rng.random() < 0.7)
     pictures(plan, rng.randint(1, 3))
     _small_things(plan)
@@ -78,8 +86,8 @@ def _television(plan: FloorPlan, stand: Placed) -> None:
     """Put the television on its stand or hang it above."""
     rng = plan.rng
     if rng.random() < 0.95:
-        on_wall = rng.random() < 0.25
-        model = small_things.television(rng, on_wall=on_wall)
+        on_wall = rng.random() < 0.35
+        model = small_things.television(rng, 1140, on_wall=on_wall)
         height = rng.randint(950, 1100) if on_wall else stand.model.height
         plan.at(model, stand.spot._replace(height=height), margin=0)
     front = stand.model.rect
@@ -101,14 +109,34 @@ def _between(plan: FloorPlan, stand: Placed, sofa: Placed) -> None:
             height = _RUG_HEIGHT
     x, z = sofa.spot.point(0, out)
     spot = Spot(x, z, height, sofa.spot.quarter)
-    gap = plan_distance(stand, spot)
+    gap = _distance_between(stand, spot)
     if gap - table.depth >= 700 and plan.fits(table, spot):
         plan.add(table, spot)
+        _across(plan, sofa, out + table.depth // 2, table.width // 2 + rng.randint(450, 600))
     width = sofa.model.rect
     plan.keep_free(sofa.spot.rect(Rect(width.x0, sofa.model.depth, width.x1, sofa.model.depth + 300)))
 
 
-def plan_distance(stand: Placed, spot: Spot) -> int:
+def _across(plan: FloorPlan, sofa: Placed, ahead: int, aside: int) -> None:
+    """Place an armchair or a short sofa at one end of the coffee table or both, looking at it.
+
+    Args:
+        plan: The room.
+        sofa: The sofa in front of the table.
+        ahead: Distance of the table's middle from the sofa's back.
+        aside: Distance of the seats' fronts from the table's middle.
+    """
+    rng = plan.rng
+    for side in (-1, 1):
+        if rng.random() < 0.55:
+            model = seating.arm_chair(rng) if rng.random() < 0.75 else seating.love_seat(rng)
+            x, z = sofa.spot.point(side * (aside + model.depth), ahead)
+            spot = Spot(x, z, 0, (sofa.spot.quarter - side) % 4)
+            if plan.fits(model, spot, 100):
+                plan.add(model, spot)
+
+
+def _distance_between(stand: Placed, spot: Spot) -> int:
     """Return the free length between a stand's front and a spot in its axis."""
     front_x, front_z = stand.spot.point(0, stand.model.depth)
     return abs(spot.x - front_x) + abs(spot.z - front_z)

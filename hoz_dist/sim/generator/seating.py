@@ -8,7 +8,7 @@ from hoz_dist.sim.generator.solids import Model, Rect, Top, box, vary
 
 def chair(rng: Random) -> Model:
     """A chair with four legs, a seat and a back; it looks away from its back."""
-    width, depth, height = vary(rng, 460, 12), vary(rng, 500, 10), vary(rng, 880, 10)
+    width, depth, height = vary(rng, 470, 12), vary(rng, 530, 10), vary(rng, 880, 10)
     wood = paint(rng, "chair")
     seat = paint(rng, "fabric") if rng.random() < 0.4 else wood
     half, leg, seat_height = width // 2, 40, vary(rng, 450, 5)
@@ -43,12 +43,45 @@ def stool(rng: Random) -> Model:
 
 def sofa(rng: Random) -> Model:
     """A sofa with arms, back and cushions; things can lie on the seat."""
-    return _upholstered("Sofa", rng, vary(rng, 2150, 12), vary(rng, 900, 6), seats=rng.choice((2, 3)))
+    return _upholstered("Sofa", rng, vary(rng, 2300, 12), vary(rng, 920, 6), seats=rng.choice((2, 3)))
 
 
 def arm_chair(rng: Random) -> Model:
     """A sofa for one."""
     return _upholstered("ArmChair", rng, vary(rng, 880, 8), vary(rng, 860, 6), seats=1)
+
+
+def love_seat(rng: Random) -> Model:
+    """A sofa for two."""
+    return _upholstered("Sofa", rng, vary(rng, 1500, 8), vary(rng, 880, 6), seats=2)
+
+
+def bench(rng: Random, width: int) -> Model:
+    """An upholstered bench, for the end of a bed."""
+    half, depth, height = width // 2, vary(rng, 400, 10), vary(rng, 440, 8)
+    wood = paint(rng, "wood")
+    return Model.of(
+        "Bench",
+        [
+            box((-half, half), (0, depth), (height - 110, height), paint(rng, "fabric")),
+            box((-half + 40, -half + 100), (30, depth - 30), (0, height - 110), wood),
+            box((half - 100, half - 40), (30, depth - 30), (0, height - 110), wood),
+        ],
+    )
+
+
+def ottoman(rng: Random) -> Model:
+    """A footstool that stands anywhere on the floor."""
+    width, height = vary(rng, 560, 25), vary(rng, 400, 12)
+    half, colour = width // 2, paint(rng, "fabric")
+    return Model.of(
+        "Ottoman",
+        [
+            box((-half + 40, half - 40), (40, width - 40), (0, 60), (0.12, 0.1, 0.09)),
+            box((-half, half), (0, width), (60, height - 100), shade(colour, 85)),
+            box((-half, half), (0, width), (height - 100, height), colour),
+        ],
+    )
 
 
 def _upholstered(category: str, rng: Random, width: int, depth: int, seats: int) -> Model:
@@ -79,7 +112,7 @@ def _upholstered(category: str, rng: Random, width: int, depth: int, seats: int)
 
 def bed(rng: Random, width: int) -> Model:
     """A bed, its head at the wall; things can lie on the lower half."""
-    width, length, top = vary(rng, width, 8), vary(rng, 2080, 4), vary(rng, 540, 8)
+    width, length, top = vary(rng, width, 8), vary(rng, 2180, 4), vary(rng, 560, 8)
     wood, cover = paint(rng, "wood"), paint(rng, "bedding")
     half = width // 2
     pillows = [(-half + 60, -20), (20, half - 60)] if width > 1200 else [(-300, 300)]

@@ -16,20 +16,20 @@ _SWITCH_WIDTH: Final = 130
 _WINDOW_TRIES: Final = 12
 
 
-def shell(plan: FloorPlan, floor: str, *, band: int = 90) -> Item:
+def shell(plan: FloorPlan, floor: str, *, tiles: int = 0) -> Item:
     """Make floor, ceiling and walls, one body around the room's inside.
 
     Args:
         plan: The room.
         floor: Material of the floor.
-        band: Height of the band along the foot of the walls: a skirting, or tiles.
+        tiles: Height to which the walls are tiled, mm.
     """
     rng, width, depth, height = plan.rng, plan.width, plan.depth, plan.height
     wall = paint(rng, "wall")
     walls = [wall] * 4
     if rng.random() < 0.4:
         walls[rng.choice(WALLS)] = paint(rng, "wall")
-    foot = paint(rng, "white") if band < 200 else paint(rng, "tile_floor")
+    tile = paint(rng, "tile_floor")
     outside = ((-_THICK, width + _THICK), (-_THICK, depth + _THICK))
     solids = [
         box(*outside, (-_THICK, 0), paint(rng, floor)),
@@ -42,7 +42,9 @@ def shell(plan: FloorPlan, floor: str, *, band: int = 90) -> Item:
         ((width, width + _THICK), (0, depth)),
     )
     for (x, z), colour in zip(sides, walls, strict=True):
-        solids += [box(x, z, (0, band), foot), box(x, z, (band, height), colour)]
+        solids.append(box(x, z, (tiles, height), colour))
+        if tiles:
+            solids.append(box(x, z, (0, tiles), tile))
     return Item("Walls", tuple(solid.part() for solid in solids))
 
 
@@ -129,8 +131,8 @@ def window(rng: Random, width: int, *, curtains: bool) -> Model:
         box((-15, 15), (12, 28), (0, height), white),
     ]
     if curtains:
-        for x in ((-half - 200, -half + 80), (half - 80, half + 200)):
-            solids.append(box(x, (32, 48), (-250, height + 120), curtain))
+        sides = ((-half - 200, -half + 80), (half - 80, half + 200))
+        solids += [box(x, (32, 48), (-250, height + 120), curtain) for x in sides]
     return Model.of("Window", solids)
 
 

@@ -11,7 +11,7 @@ _DARK: Final[Colour] = (0.1, 0.1, 0.1)
 
 def kettle(rng: Random) -> Model:
     """A kettle with lid, handle and spout."""
-    width, height = vary(rng, 170, 10), vary(rng, 200, 12)
+    width, height = vary(rng, 180, 10), vary(rng, 195, 12)
     half, colour = width // 2, paint(rng, "kettle")
     return Model.of(
         "Kettle",
@@ -154,9 +154,10 @@ def alarm_clock(rng: Random) -> Model:
     )
 
 
-def television(rng: Random, *, on_wall: bool) -> Model:
+def television(rng: Random, width: int, *, on_wall: bool) -> Model:
     """A flat television, on a foot or for the wall."""
-    width, height = vary(rng, 1140, 15), vary(rng, 690, 10)
+    width = vary(rng, width, 15)
+    height = width * rng.randint(56, 66) // 100
     half, colour = width // 2, paint(rng, "black")
     screen = paint(rng, rng.choice(("dark_screen", "dark_screen", "screen")))
     if on_wall:
@@ -194,7 +195,7 @@ def desk_lamp(rng: Random) -> Model:
 
 def floor_lamp(rng: Random) -> Model:
     """A standing lamp: foot, pole and shade."""
-    height, width = vary(rng, 1750, 8), vary(rng, 440, 12)
+    height, width = vary(rng, 1840, 6), vary(rng, 490, 12)
     half, pole = width // 2, paint(rng, rng.choice(("black", "steel")))
     return Model.of(
         "FloorLamp",
@@ -208,7 +209,7 @@ def floor_lamp(rng: Random) -> Model:
 
 def garbage_can(rng: Random) -> Model:
     """A bin: an open one, or one with a lid and a pedal."""
-    width, depth, height = vary(rng, 360, 15), vary(rng, 310, 12), vary(rng, 540, 15)
+    width, depth, height = vary(rng, 410, 15), vary(rng, 350, 12), vary(rng, 550, 15)
     half, colour = width // 2, paint(rng, "bin")
     if rng.random() < 0.5:
         wall = 20

@@ -77,11 +77,13 @@ class Top(NamedTuple):
     height: int
     clear: int = 2000
     """Free height above it."""
+    centred: bool = False
+    """Whether a thing stands in the middle of it (a pot on a burner), even where it is wider than the top."""
 
 
 @dataclass(frozen=True)
 class Model:
-    """An object in its own frame: x from left to right around 0, its back at z = 0, its front ahead of it, standing at 0."""
+    """An object in its own frame: x from left to right around 0, back at z = 0, front ahead of it, standing at 0."""
 
     category: str
     solids: tuple[Solid, ...]

@@ -59,7 +59,7 @@ def coffee_table(rng: Random) -> Model:
 
 def side_table(rng: Random) -> Model:
     """A bed-side or sofa-side table with a drawer."""
-    width, depth, height = vary(rng, 560), vary(rng, 400, 10), vary(rng, 620, 8)
+    width, depth, height = vary(rng, 600), vary(rng, 410, 10), vary(rng, 640, 8)
     colour = paint(rng, "wood")
     front = shade(colour, 80)
     solids = [
@@ -72,32 +72,31 @@ def side_table(rng: Random) -> Model:
 
 def desk(rng: Random) -> Model:
     """A desk: a top on a drawer block and a side, open for a chair."""
-    width, depth, height = vary(rng, 1300), vary(rng, 620, 8), vary(rng, 760, 4)
+    width, depth, height = vary(rng, 1360), vary(rng, 630, 8), vary(rng, 780, 4)
     colour = paint(rng, "wood")
-    half, block = width // 2, 380
-    left = rng.random() < 0.5
-    x = (-half, -half + block) if left else (half - block, half)
-    side = (half - 40, half) if left else (-half, -half + 40)
-    drawers = [
-        box((x[0] + 20, x[1] - 20), (depth - 20, depth), (h, h + (height - 140) // 3 - 20), shade(colour, 75))
-        for h in range(80, height - 140, (height - 140) // 3)
+    half, block, board, under = width // 2, 380, 40, height - 40
+    if rng.random() < 0.5:
+        drawers_x, knees_x, side_x = (-half, -half + block), (-half + block, half - board), (half - board, half)
+    else:
+        drawers_x, knees_x, side_x = (half - block, half), (-half + board, half - block), (-half, -half + board)
+    step = (under - 100) // 3
+    fronts = [
+        box((drawers_x[0] + 20, drawers_x[1] - 20), (depth - 20, depth), (h, h + step - 20), shade(colour, 75))
+        for h in range(80, 80 + 3 * step, step)
     ]
     solids = [
-        _slab(width, depth, (height - 40, height), colour),
-        box(x, (0, depth - 20), (0, height - 40), shade(colour, 90)),
-        box(side, (0, depth), (0, height - 40), shade(colour, 90)),
-        box((-half + 40, half - 40), (0, 20), (height // 2, height - 40), shade(colour, 80)),
-        *drawers[:3],
+        _slab(width, depth, (under, height), colour),
+        box(drawers_x, (0, depth - 20), (0, under), shade(colour, 90)),
+        box(side_x, (0, depth), (0, under), shade(colour, 90)),
+        box(knees_x, (0, 20), (height // 2, under), shade(colour, 80)),
+        *fronts,
     ]
-    overlapping_back = solids.pop(3)
-    inner = (x[1], side[0]) if left else (side[1], x[0])
-    solids.append(box(inner, overlapping_back.z, overlapping_back.h, overlapping_back.colour))
     return Model.of("Desk", solids, _top(width, depth, height))
 
 
 def dresser(rng: Random) -> Model:
     """A chest of drawers."""
-    width, depth, height = vary(rng, 1200), vary(rng, 500, 8), vary(rng, 900, 10)
+    width, depth, height = vary(rng, 1200), vary(rng, 500, 8), vary(rng, 950, 10)
     colour = paint(rng, "wood")
     front = shade(colour, 78)
     rows = 3
@@ -113,7 +112,7 @@ def dresser(rng: Random) -> Model:
 
 def tv_stand(rng: Random) -> Model:
     """A low cabinet for a television."""
-    width, depth, height = vary(rng, 1400), vary(rng, 430, 8), vary(rng, 520)
+    width, depth, height = vary(rng, 1400), vary(rng, 430, 8), vary(rng, 560)
     colour = paint(rng, rng.choice(("wood", "wood", "white", "black")))
     third = width // 3
     solids = [
@@ -157,7 +156,7 @@ def shelf(rng: Random) -> Model:
 
 def wardrobe(rng: Random) -> Model:
     """A tall cupboard with two doors."""
-    width, depth, height = vary(rng, 1200), vary(rng, 600, 6), vary(rng, 2050, 4)
+    width, depth, height = vary(rng, 1400, 20), vary(rng, 600, 6), vary(rng, 2050, 4)
     colour = paint(rng, rng.choice(("wood", "wood", "white")))
     half = width // 2
     solids = [
