@@ -1,0 +1,94 @@
+"""A tiny room is learnt within seconds, by every method, in one process."""
+
+import numpy as np
+import pytest
+import torch
+from numpy.typing import NDArray
+
+from hoz_dist.config import RunConfig
+from hoz_dist.graph.room_graph import explore_room
+from hoz_dist.graph.scene_graph import merge_rooms
+from hoz_dist.nav.categories import TARGETS
+from hoz_dist.nav.rooms import RoomId
+from hoz_dist.policy.parameters import initial_parameters
+from hoz_dist.policy.settings import Method
+from hoz_dist.sim.batch_env import BatchEnv
+from hoz_dist.sim.pose_graph import PoseGraph
+from hoz_dist.sim.room_views import RoomViews
+from learner.optimizer import FlatAdam, gradient_norm
+from tests.unit.sim.making import open_grid
+from workers.collector import Collector
+
+TARGET = TARGETS.index("Fridge")
+UPDATES = 120
+
+
+def looking_at_fridge(graph: PoseGraph) -> NDArray[np.bool_]:
+    """Whether the fridge, which stands beyond the far wall, is in sight: at yaw 0."""
+    return np.array([graph.pose(view).yaw == 0 for view in range(graph.views)])
+
+
+def tiny_room() -> RoomViews:
+    """A 3 x 3 room; the fridge is seen at yaw 0, and near enough in the last row."""
+    graph = open_grid(3, 3)
+    seen = looking_at_fridge(graph)
+    near = np.repeat(graph.positions[:, 1] == 2, 16)
+    success = np.zeros((graph.views, len(TARGETS)), dtype=np.bool_)
+    success[:, TARGET] = seen & near
+    detections = np.zeros((graph.views, len(TARGETS), 5), dtype=np.float32)
+    size = np.where(near, 0.5, 0.2).astype(np.float32)
+    detections[:, TARGET] = np.stack([0.5 - size / 2, 0.5 - size / 2, 0.5 + size / 2, 0.5 + size / 2, size > 0], 1)
+    detections *= seen[:, None, None]
+    features = np.zeros((graph.views, 6, 7, 7), dtype=np.float16)
+    features[:, 0] = seen[:, None, None]
+    features[:, 1] = (seen & near)[:, None, None]
+    return RoomViews(
+        room=RoomId("kitchen", 1),
+        digest="tiny",
+        graph=graph,
+        features=features,
+        detections=detections,
+        appearance=detections[..., 4:].repeat(6, axis=-1).astype(np.float16),
+        success=success,
+        optimal=np.stack([graph.distances_to(goal) for goal in success.T], axis=1),
+        targets=(TARGET,),
+    )
+
+
+def train(config: RunConfig, updates: int) -> tuple[float, NDArray[np.float32]]:
+    """Train in one process; return the success rate of the last episodes and the parameters."""
+    views = tiny_room()
+    rng = np.random.default_rng(config.seed)
+    env = BatchEnv(config.batch, rng, max_actions=30)
+    env.add_room(views)
+    collector = Collector(config, env, rng)
+    graph = explore_room(
+        str(views.room),
+        views.digest,
+        transitions=views.graph.transitions,
+        positions=views.graph.positions,
+        bags=views.bag,
+        zones=config.zones,
+    )
+    collector.bank.put(merge_rooms("kitchen", [graph], version=1))
+    optimizer = FlatAdam(initial_parameters(config), config.learning_rate, config.gradient_norm)
+    ended: list[bool] = []
+    for _ in range(updates):
+        collector.parameters.load(optimizer.parameters)
+        update = collector.roll_out()
+        optimizer.step(update.gradient, gradient_norm(update.gradient))
+        ended += [result.success for result in update.finished]
+    return float(np.mean(ended[-200:])), optimizer.parameters.copy()
+
+
+@pytest.mark.parametrize("method", ["a3c", "object", "hoz"])
+def test_a_tiny_room_is_learnt(method: Method) -> None:
+    success, _ = train(RunConfig(method=method, batch=16, learning_rate=3e-3), UPDATES)
+    assert success > 0.9
+
+
+def test_one_seed_gives_identical_parameters_twice() -> None:
+    config = RunConfig(batch=8)
+    assert np.array_equal(train(config, 5)[1], train(config, 5)[1])
+    assert not np.array_equal(train(config, 5)[1], train(RunConfig(batch=8, seed=1), 5)[1])
+    assert torch.get_num_threads() == 1

@@ -1,0 +1,60 @@
+import math
+from dataclasses import replace
+
+import torch
+
+from hoz_dist.a3c.loss import LossWeights, a3c_loss
+from tests.unit.a3c.making import make_rollout
+
+WEIGHTS = LossWeights(discount=0.9, gae_lambda=0.95, value=0.0, entropy=0.0, scene=0.0)
+
+
+def test_a_step_along_the_gradient_favours_actions_that_went_well() -> None:
+    rollout = make_rollout(steps=1, batch=2, seed=0, ends=False)
+    rollout = replace(
+        rollout,
+        actions=torch.tensor([[2, 4]]),
+        rewards=torch.tensor([[1.0, -1.0]]),
+        values=torch.zeros(1, 2),
+        bootstrap=torch.zeros(2),
+    )
+    logits = torch.zeros(1, 2, 6, requires_grad=True)
+    a3c_loss(rollout, logits, torch.zeros(1, 2), WEIGHTS).total.backward()
+    assert logits.grad is not None
+    assert logits.grad[0, 0, 2] < 0 < logits.grad[0, 1, 4]
+
+
+def test_the_value_moves_to_the_return() -> None:
+    rollout = make_rollout(steps=4, batch=3, seed=1)
+    values = rollout.values.clone().requires_grad_()
+    a3c_loss(rollout, torch.zeros(4, 3, 6), values, WEIGHTS._replace(value=1.0)).total.backward()
+    after = a3c_loss(rollout, torch.zeros(4, 3, 6), values.detach() - 0.5 * values.grad, WEIGHTS)
+    assert after.value < a3c_loss(rollout, torch.zeros(4, 3, 6), rollout.values, WEIGHTS).value
+
+
+def test_steps_that_only_reset_do_not_count() -> None:
+    rollout = make_rollout(steps=6, batch=5, seed=2)
+    assert not rollout.valid.all()
+    logits = torch.randn(6, 5, 6, requires_grad=True)
+    values = torch.randn(6, 5, requires_grad=True)
+    a3c_loss(rollout, logits, values, WEIGHTS._replace(value=1.0, entropy=1.0)).total.backward()
+    assert logits.grad is not None
+    assert values.grad is not None
+    assert logits.grad[~rollout.valid].abs().max() == 0.0
+    assert values.grad[~rollout.valid].abs().max() == 0.0
+
+
+def test_entropy_of_the_uniform_policy_is_log_six() -> None:
+    rollout = make_rollout(steps=3, batch=2, seed=3)
+    loss = a3c_loss(rollout, torch.zeros(3, 2, 6), torch.zeros(3, 2), WEIGHTS)
+    assert math.isclose(loss.entropy, math.log(6), rel_tol=1e-5)
+
+
+def test_scene_labels_train_the_scene_layer() -> None:
+    rollout = make_rollout(steps=2, batch=2, seed=4)
+    scene_logits = torch.zeros(2, 2, 4, requires_grad=True)
+    labels = torch.full((2, 2), 3)
+    arguments = (rollout, torch.zeros(2, 2, 6), torch.zeros(2, 2), WEIGHTS._replace(scene=1.0), scene_logits, labels)
+    a3c_loss(*arguments).total.backward()
+    assert scene_logits.grad is not None
+    assert (scene_logits.grad[..., 3] < 0).all()

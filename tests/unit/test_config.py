@@ -1,0 +1,51 @@
+import json
+from typing import Any
+
+import pytest
+
+from hoz_dist.config import RunConfig
+from hoz_dist.errors import HozError, InvalidValueError, UnknownNameError
+from hoz_dist.policy.encoders.pooled import PooledEncoder
+
+
+def test_json_and_back() -> None:
+    config = RunConfig(method="object", minutes=3, seed=4)
+    assert RunConfig.from_json(json.loads(json.dumps(config.to_json()))) == config
+
+
+@pytest.mark.parametrize(
+    ("change", "error"),
+    [
+        ({"method": "dqn"}, UnknownNameError),
+        ({"edge_cost": "none"}, UnknownNameError),
+        ({"zones": 1}, InvalidValueError),
+        ({"learning_rate": -1.0}, InvalidValueError),
+        ({"learning_rate": float("nan")}, InvalidValueError),
+        ({"minutes": 1.0, "frames": 5}, InvalidValueError),
+        ({"batch": "64"}, InvalidValueError),
+        ({"batch": True}, InvalidValueError),
+        ({"seed": 0.5}, InvalidValueError),
+        ({"colour": "red"}, InvalidValueError),
+    ],
+)
+def test_bad_values_are_refused_in_one_sentence(change: dict[str, Any], error: type[HozError]) -> None:
+    with pytest.raises(error) as caught:
+        RunConfig.from_json(RunConfig().to_json() | change)
+    assert str(caught.value).endswith(".")
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("values", [None, [], {}, {"method": "hoz"}])
+def test_what_is_no_configuration_is_refused(values: object) -> None:
+    with pytest.raises(InvalidValueError):
+        RunConfig.from_json(values)
+
+
+def test_differences_are_named_with_both_values() -> None:
+    assert RunConfig(seed=1).differences(RunConfig(seed=2)) == ["seed: 1, 2"]
+    assert RunConfig().differences(RunConfig()) == []
+
+
+def test_defaults_describe_the_default_encoder() -> None:
+    encoder = PooledEncoder()
+    assert (RunConfig().encoder_key, RunConfig().channels) == (encoder.key, encoder.channels)
