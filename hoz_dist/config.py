@@ -5,6 +5,7 @@ from typing import Any, Final, get_args
 
 from hoz_dist.errors import InvalidValueError, UnknownNameError
 from hoz_dist.graph.planner import EdgeCost
+from hoz_dist.nav.pose import PICTURE_SIZE
 from hoz_dist.policy.settings import EncoderName, Method, PolicySettings, Preset
 
 PRESET_LEARNING_RATES: Final[dict[Preset, float]] = {"compact": 1e-3, "paper": 1e-4}
@@ -27,7 +28,7 @@ class RunConfig:
     """Names the encoder's version and weights: actors with others are refused."""
     channels: int = 6
     """C, features of a grid cell of the encoder."""
-    picture_size: int = 84
+    picture_size: int = PICTURE_SIZE
     """Side of the camera's picture, pixels."""
     zones: int = 8
     """K, zones of a graph."""

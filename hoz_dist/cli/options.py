@@ -2,12 +2,11 @@
 
 import json
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import click
 
-DEFAULT_PICTURE_SIZE: Final = 84
-"""Side of the camera's pictures, pixels; the same as a run's by default, so that the view cache is shared."""
+from hoz_dist.nav.pose import PICTURE_SIZE
 
 cache_option = click.option(
     "--cache",
@@ -18,7 +17,7 @@ cache_option = click.option(
 picture_size_option = click.option(
     "--picture-size",
     type=click.IntRange(16, 512),
-    default=DEFAULT_PICTURE_SIZE,
+    default=PICTURE_SIZE,
     show_default=True,
     help="Side of the camera's square pictures, pixels.",
 )

@@ -10,6 +10,8 @@ PITCHES: Final[tuple[int, ...]] = (0, 30)
 """Pitch angles, degrees down."""
 CAMERA_HEIGHT_M: Final = 1.58
 FIELD_OF_VIEW_DEG: Final = 90.0
+PICTURE_SIZE: Final = 64
+"""Side of the camera's square pictures unless told otherwise, pixels; see docs/decisions/picture-size.md."""
 AGENT_RADIUS_M: Final = 0.2
 HEADINGS: Final[tuple[tuple[int, int], ...]] = ((0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1))
 """Grid steps (dx, dz) of MoveAhead, by index into `YAWS`."""

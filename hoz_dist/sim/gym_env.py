@@ -15,6 +15,7 @@ from hoz_dist.errors import InvalidValueError, UnknownNameError
 from hoz_dist.nav.actions import NO_ACTION, Action
 from hoz_dist.nav.categories import TARGETS, category_index
 from hoz_dist.nav.episode import Episode, evaluation_cap
+from hoz_dist.nav.pose import PICTURE_SIZE
 from hoz_dist.nav.reward import STEP_REWARD, SUCCESS_REWARD
 from hoz_dist.nav.rooms import RoomId, Split, rooms_of
 from hoz_dist.sim.catalogue import load_room
@@ -22,7 +23,7 @@ from hoz_dist.sim.detections import Detector
 from hoz_dist.sim.episodes import EVALUATION_PITCHES, TRAINING_PITCHES, EpisodeSampler
 from hoz_dist.sim.painter import Painter
 from hoz_dist.sim.room_views import RoomViews
-from hoz_dist.sim.view_store import DEFAULT_PICTURE_SIZE, ViewStore
+from hoz_dist.sim.view_store import ViewStore
 
 FARTHEST_M: Final = 20.0
 """Bound of depths, metres: the camera's far plane."""
@@ -123,7 +124,7 @@ class ObjectNavEnv(gymnasium.Env[dict[str, Any], np.int64]):
     |----------------|----------------------|-------------|---------------------------------------------------------|
     | `rooms`        | str, sequence of str | `"kitchen"` | Scenes (all rooms of the split) and rooms (`kitchen/3`) |
     | `split`        | str                  | `"train"`   | `train`, `val` or `test`: rooms that a scene stands for |
-    | `picture_size` | int                  | 84          | S                                                       |
+    | `picture_size` | int                  | 64          | S                                                       |
     | `max_actions`  | int                  | None        | Cap on actions of an episode                            |
     | `live`         | bool                 | False       | Render every step instead of looking stored views up    |
     | `cache`        | str, Path            | None        | View cache; by default `HOZ_CACHE` or the user's cache  |
@@ -142,7 +143,7 @@ class ObjectNavEnv(gymnasium.Env[dict[str, Any], np.int64]):
         rooms: str | Sequence[str] = "kitchen",
         *,
         split: Split = "train",
-        picture_size: int = DEFAULT_PICTURE_SIZE,
+        picture_size: int = PICTURE_SIZE,
         max_actions: int | None = None,
         live: bool = False,
         cache: str | Path | None = None,

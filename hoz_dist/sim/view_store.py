@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from hoz_dist.errors import DamagedFileError, InvalidValueError
 from hoz_dist.nav.categories import SCENE_TARGETS, category_index
 from hoz_dist.nav.encoder import VisualEncoder
+from hoz_dist.nav.pose import PICTURE_SIZE
 from hoz_dist.nav.rooms import RoomId
 from hoz_dist.sim.appearance import appearance
 from hoz_dist.sim.catalogue import load_room
@@ -37,7 +38,6 @@ from hoz_dist.sim.view_folder import Frames, ViewFolder
 
 FORMAT_VERSION: Final = 1
 """Raised when the files of a room's folder change their meaning."""
-DEFAULT_PICTURE_SIZE: Final = 84
 Progress = Callable[[int, int], None]
 """Called with the number of views done and the number of all views."""
 
@@ -56,7 +56,7 @@ class ViewStore:
     def __init__(
         self,
         folder: Path | None = None,
-        picture_size: int = DEFAULT_PICTURE_SIZE,
+        picture_size: int = PICTURE_SIZE,
         rooms: Callable[[RoomId], Room] = load_room,
     ) -> None:
         """Use a cache folder, which is made when something is first stored in it.
