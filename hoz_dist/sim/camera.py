@@ -6,11 +6,9 @@ import numpy as np
 import pybullet
 from numpy.typing import NDArray
 
-from hoz_dist.nav.pose import CAMERA_HEIGHT_M, FIELD_OF_VIEW_DEG, Pose
+from hoz_dist.nav.pose import CAMERA_HEIGHT_M, FIELD_OF_VIEW_DEG, PICTURE_SIZE, Pose
 from hoz_dist.sim.world import World
 
-DEFAULT_SIZE: Final = 84
-"""Side of a picture, pixels."""
 NEAR_M: Final = 0.05
 FAR_M: Final = 20.0
 _LIGHT_DIRECTION: Final = (1.0, -2.0, 3.0)
@@ -33,7 +31,7 @@ class Frame(NamedTuple):
 class Camera:
     """Draws the world from poses of the agent with PyBullet's TinyRenderer: no display and no GPU needed."""
 
-    def __init__(self, world: World, size: int = DEFAULT_SIZE) -> None:
+    def __init__(self, world: World, size: int = PICTURE_SIZE) -> None:
         """Look into a world.
 
         Args:
@@ -69,11 +67,4 @@ class Camera:
         rgb = np.ascontiguousarray(np.reshape(colours, (*shape, 4))[..., :3], dtype=np.uint8)
         # The buffer b in [0, 1] of an OpenGL projection: depth = far near / (far - (far - near) b).
         depth = FAR_M * NEAR_M / (FAR_M - (FAR_M - NEAR_M) * np.reshape(buffer, shape).astype(np.float64))
-        return Frame(rgb, depth.astype(np.float32), self._labels(np.reshape(bodies, shape)))
-
-    def _labels(self, bodies: NDArray[np.int32]) -> NDArray[np.uint8]:
-        """Turn PyBullet body ids (-1: nothing), [S, S], into item indices plus 1."""
-        table = np.zeros(max(self.world.body_items, default=0) + 2, dtype=np.uint8)
-        for body, item in self.world.body_items.items():
-            table[body + 1] = item + 1
-        return table[bodies + 1]
+        return Frame(rgb, depth.astype(np.float32), self.world.labels[np.reshape(bodies, shape) + 1])

@@ -3,7 +3,9 @@
 from types import TracebackType
 from typing import Final, Self
 
+import numpy as np
 import pybullet
+from numpy.typing import NDArray
 
 from hoz_dist.nav.pose import AGENT_RADIUS_M
 from hoz_dist.sim.room import Item, Room
@@ -33,6 +35,8 @@ class World:
         """Identifier of the PyBullet client."""
         self.body_items: dict[int, int] = {}
         """Index into the room's items, by PyBullet body id."""
+        self.labels: NDArray[np.uint8] = np.zeros(1, dtype=np.uint8)
+        """Index into the room's items plus 1, by PyBullet body id plus 1; 0 for no body (-1)."""
         self._room: Room | None = None
         self._cylinder = -1
         self._sweeps: dict[float, int] = {}
@@ -76,6 +80,9 @@ class World:
         """
         pybullet.resetSimulation(physicsClientId=self.client)
         self.body_items = {_create_body(item, self.client): index for index, item in enumerate(room.items)}
+        self.labels = np.zeros(max(self.body_items, default=-1) + 2, dtype=np.uint8)
+        for body, index in self.body_items.items():
+            self.labels[body + 1] = index + 1
         height = _AGENT_HIGH_M - _AGENT_LOW_M
         self._cylinder = self._hidden_body(
             pybullet.createCollisionShape(

@@ -18,7 +18,7 @@ _FURNISH: Final[dict[str, Callable[[FloorPlan], None]]] = {
 }
 _EXTENTS: Final[dict[str, tuple[tuple[int, int], tuple[int, int]]]] = {
     "kitchen": ((3100, 4800), (3300, 5000)),
-    "living_room": ((4800, 7200), (4400, 6400)),
+    "living_room": ((4700, 7000), (4300, 6300)),
     "bedroom": ((4000, 5500), (3900, 5500)),
     "bathroom": ((2300, 3700), (2500, 4000)),
 }
