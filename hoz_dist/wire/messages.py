@@ -10,13 +10,13 @@ from typing import Annotated, Any, ClassVar, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from hoz_dist.errors import UnknownNameError
 from hoz_dist.nav.categories import SCENES, TARGETS
 from hoz_dist.nav.episode import EpisodeResult
 from hoz_dist.nav.rooms import RoomId
+from hoz_dist.wire.fields import EpisodeFields, RoomName
 from hoz_dist.wire.keys import NAME_PATTERN
 from hoz_dist.wire.rejection import Reason, RejectedError
-from hoz_dist.wire.schema import Bool, Counts, Int, JsonObject, Many, OneOf, Real, Record, Spec, Structure, Tensor, Text
+from hoz_dist.wire.schema import Counts, Int, JsonObject, Many, OneOf, Real, Record, Structure, Tensor, Text
 
 MAX_PARAMETERS: Final = 30_000_000
 """Largest number of policy parameters; three times the paper's sizes, and within Zenoh's largest message."""
@@ -34,64 +34,8 @@ _VECTOR: Final = Tensor("float32", rank=1, most=MAX_PARAMETERS)
 _NODES: Final = Tensor("float64", rank=2, most=MAX_ZONES * len(TARGETS), low=0.0, high=1.0)
 _EDGES: Final = Tensor("float64", rank=2, most=MAX_ZONES**2, low=0.0, high=1.0)
 _ZONE: Final = Int(0, MAX_ZONES - 1)
-
-
-class RoomName:
-    """Spec of a room; ``kitchen/3`` on the wire, a `RoomId` here."""
-
-    def pack(self, value: RoomId) -> object:
-        """Return the room's name."""
-        return str(value)
-
-    def unpack(self, raw: object, where: str) -> object:
-        """Return the room of that name."""
-        Text(64).check(raw, where)
-        try:
-            return RoomId.parse(str(raw))
-        except UnknownNameError as error:
-            raise RejectedError(Reason.NAME, f"{where}: {error}") from error
-
-    def check(self, value: Any, where: str) -> None:
-        """Judge a value; see `Spec.check`."""
-        if type(value) is not RoomId:
-            raise RejectedError(Reason.TYPE, f"{where} is not a room but {type(value).__name__}")
-        self.unpack(str(value), where)
-
-
 _ROOM: Final = RoomName()
-
-
-class EpisodeFields:
-    """Spec of an `EpisodeResult`; a list of its fields in order on the wire, since there are many of them."""
-
-    FIELDS: ClassVar[tuple[Spec, ...]] = (
-        _ROOM,
-        Int(0, len(TARGETS) - 1),
-        Bool(),
-        Int(1, 10**6),
-        Int(0, 10**6),
-        Bool(),
-        Int(0, 10**6),
-    )
-
-    def pack(self, value: EpisodeResult) -> object:
-        """Return the list of the fields."""
-        return [spec.pack(field) for spec, field in zip(self.FIELDS, value, strict=True)]
-
-    def unpack(self, raw: object, where: str) -> object:
-        """Return the result with those fields."""
-        if type(raw) is not list or len(raw) != len(self.FIELDS):
-            raise RejectedError(Reason.TYPE, f"{where} is not a list of {len(self.FIELDS)} fields")
-        return EpisodeResult._make(spec.unpack(field, where) for spec, field in zip(self.FIELDS, raw, strict=True))
-
-    def check(self, value: Any, where: str) -> None:
-        """Judge a value; see `Spec.check`."""
-        if type(value) is not EpisodeResult:
-            raise RejectedError(Reason.TYPE, f"{where} is not an episode's result but {type(value).__name__}")
-        for name, spec, field in zip(value._fields, self.FIELDS, value, strict=True):
-            spec.check(field, f"{where}.{name}")
-        if value.moves > value.actions:
-            raise RejectedError(Reason.RANGE, f"{where} has more moves than actions")
+_EPISODES: Final = Many(EpisodeFields(), MAX_EPISODES)
 
 
 class Message(Structure):
@@ -158,7 +102,7 @@ class EpisodesPush(Push):
     frames: Annotated[int, Int()]
     frames_per_second: Annotated[float, Real(0.0)]
     lag: Annotated[float, Real(0.0)]
-    episodes: Annotated[tuple[EpisodeResult, ...], Many(EpisodeFields(), MAX_EPISODES)]
+    episodes: Annotated[tuple[EpisodeResult, ...], _EPISODES]
 
 
 @dataclass(frozen=True, eq=False)

@@ -246,6 +246,17 @@ def test_an_inbox_is_bounded_by_bytes_too(endpoint: str) -> None:
         assert isinstance(decode(answer, Busy), Busy)
         taken(inbox).answer(Accepted(1, 1))
         first.join(WAIT_S)
+        with answering(inbox, lambda _: Accepted(1, 1)):
+            for sequence in range(10):  # together more than may wait; what was taken out makes room
+                assert isinstance(push_to(session, samples.gradient_push(sequence)), Accepted)
+        small = [threading.Thread(target=_raw_push, args=(session, GRADS, _encoded(n, size=10))) for n in range(2)]
+        for thread in small:
+            thread.start()
+        assert until(lambda: len(inbox) == 2)
+        for thread in small:
+            taken(inbox).answer(Accepted(1, 1))
+        for thread in small:
+            thread.join(WAIT_S)
 
 
 # --- hostile pushes ---
@@ -420,7 +431,8 @@ def test_a_follower_gets_the_newest_parameters(learner: Server, client: Session,
         first = early.fetch(timeout_s=WAIT_S)
         assert first.head.stamp == (1, 0)
         np.testing.assert_array_equal(first.vector, np.arange(1000))
-        vector += 1  # the learner's own array goes on
+        vector += 1  # the learner's own array goes on, what it published does not
+        np.testing.assert_array_equal(early.fetch(timeout_s=WAIT_S).vector, np.arange(1000))
         head = publisher.publish(1, 1, vector)
         assert until(lambda: early.newest is not None and early.newest.stamp == (1, 1))
         np.testing.assert_array_equal(early.fetch((1, 1), WAIT_S).vector, np.arange(1000) + 1)
