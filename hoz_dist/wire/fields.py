@@ -36,7 +36,7 @@ class EpisodeFields:
     """Spec of an `EpisodeResult`; a list of its fields in order on the wire, since there are many of them."""
 
     FIELDS: ClassVar[tuple[Spec, ...]] = (
-        _ROOM,
+        RoomName(),
         Int(0, len(TARGETS) - 1),
         Bool(),
         Int(1, 10**6),

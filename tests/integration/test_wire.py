@@ -253,7 +253,7 @@ def test_an_inbox_is_bounded_by_bytes_too(endpoint: str) -> None:
         for thread in small:
             thread.start()
         assert until(lambda: len(inbox) == 2)
-        for thread in small:
+        for _ in small:
             taken(inbox).answer(Accepted(1, 1))
         for thread in small:
             thread.join(WAIT_S)
