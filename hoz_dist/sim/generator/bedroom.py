@@ -2,7 +2,7 @@
 
 from hoz_dist.sim.generator import seating, small_things, tables
 from hoz_dist.sim.generator.floor_plan import FloorPlan
-from hoz_dist.sim.generator.living_room import workplace
+from hoz_dist.sim.generator.dining import workplace
 from hoz_dist.sim.generator.shell import entrance, free_rug, pictures, windows
 from hoz_dist.sim.generator.solids import Placed, Rect, Spot
 

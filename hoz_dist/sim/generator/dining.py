@@ -1,9 +1,9 @@
-"""Chairs at tables."""
+"""Chairs at tables and desks."""
 
 from hoz_dist.sim.generator.floor_plan import FloorPlan
 from hoz_dist.sim.generator.seating import chair
 from hoz_dist.sim.generator.solids import Placed, Spot
-from hoz_dist.sim.generator.tables import dining_table
+from hoz_dist.sim.generator import tables
 
 
 def dining_set(plan: FloorPlan, chairs: int) -> Placed | None:
@@ -16,13 +16,22 @@ def dining_set(plan: FloorPlan, chairs: int) -> Placed | None:
     rng = plan.rng
     free_standing = rng.random() < 0.6
     for percent in (100, 90, 80, 70, 60):
-        model = dining_table(rng, percent)
+        model = tables.dining_table(rng, percent)
         table = plan.on_floor(model, 700) if free_standing else None
         table = table or plan.against_wall(model, plan.any_walls(), access=700, margin=600)
         if table:
             chairs_at(plan, table, chairs)
             return table
     return None
+
+
+def workplace(plan: FloorPlan) -> Placed | None:
+    """Place a desk with a chair."""
+    rng = plan.rng
+    desk = plan.against_wall(tables.desk(rng), plan.any_walls(), access=900)
+    if desk:
+        chairs_at(plan, desk, 1, front_only=True)
+    return desk
 
 
 def chairs_at(plan: FloorPlan, table: Placed, count: int, *, front_only: bool = False) -> None:

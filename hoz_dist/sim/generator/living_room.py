@@ -3,7 +3,7 @@
 from typing import Final
 
 from hoz_dist.sim.generator import seating, small_things, tables
-from hoz_dist.sim.generator.dining import chairs_at, dining_set
+from hoz_dist.sim.generator.dining import dining_set, workplace
 from hoz_dist.sim.generator.floor_plan import FloorPlan
 from hoz_dist.sim.generator.shell import entrance, free_rug, pictures, rug, windows
 from hoz_dist.sim.generator.solids import Placed, Rect, Spot, vary
@@ -43,15 +43,6 @@ def furnish(plan: FloorPlan) -> None:
     _small_things(plan)
     if rng.random() < 0.5:
         free_rug(plan, 1600, 1000)
-
-
-def workplace(plan: FloorPlan) -> Placed | None:
-    """Place a desk with a chair."""
-    rng = plan.rng
-    desk = plan.against_wall(tables.desk(rng), plan.any_walls(), access=900)
-    if desk:
-        chairs_at(plan, desk, 1, front_only=True)
-    return desk
 
 
 def _television_corner(plan: FloorPlan) -> None:
