@@ -1,8 +1,8 @@
 """Bedrooms: a bed with its tables, a desk, cupboards, and what lies around."""
 
 from hoz_dist.sim.generator import seating, small_things, tables
-from hoz_dist.sim.generator.floor_plan import FloorPlan
 from hoz_dist.sim.generator.dining import workplace
+from hoz_dist.sim.generator.floor_plan import FloorPlan
 from hoz_dist.sim.generator.shell import entrance, free_rug, pictures, windows
 from hoz_dist.sim.generator.solids import Placed, Rect, Spot
 

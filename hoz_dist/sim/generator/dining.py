@@ -1,9 +1,9 @@
 """Chairs at tables and desks."""
 
+from hoz_dist.sim.generator import tables
 from hoz_dist.sim.generator.floor_plan import FloorPlan
 from hoz_dist.sim.generator.seating import chair
 from hoz_dist.sim.generator.solids import Placed, Spot
-from hoz_dist.sim.generator import tables
 
 
 def dining_set(plan: FloorPlan, chairs: int) -> Placed | None:
