@@ -1,6 +1,7 @@
 """The errors that a user of hoz-dist can cause or must know of.
 
-Every message is one sentence that says what is wrong and what to do. The command line prints it and exits with status 2.
+Every message is one sentence that says what is wrong and what to do. The command line prints it and exits with status
+2.
 
     HozError
     ├── UnknownNameError      a scene, room, category, method, ... that does not exist

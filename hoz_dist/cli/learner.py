@@ -25,7 +25,7 @@ from hoz_dist.config import PRESET_LEARNING_RATES, RunConfig
     help="Folder of the run; one of the same configuration is resumed. Its last part is the run's name.",
 )
 @click.option(
-    "--method", default=RunConfig.method, show_default=True, help="What guides the agent: a3c, object or hoz."
+    "--model", "method", default=RunConfig.method, show_default=True, help="What guides the agent: a3c, object or hoz."
 )
 @click.option("--preset", default=RunConfig.preset, show_default=True, help="Sizes of the network: compact or paper.")
 @click.option("--encoder", default=RunConfig.encoder, show_default=True, help="Visual encoder: pooled or resnet18.")

@@ -13,7 +13,7 @@ from hoz_dist.nav.categories import SCENES
 @click.option(
     "--run",
     type=click.Path(file_okay=False, path_type=Path),
-    default=Path("runs/default"),
+    default=Path("runs/train"),
     show_default=True,
     help="Folder of the run; one that exists is resumed.",
 )
@@ -73,7 +73,7 @@ def train_command(
         raise InvalidValueError(message)
     rooms = training_rooms(scenes or SCENES)
     minutes = 10.0 if minutes is None and frames is None else minutes
-    learner = ["--method", model, "--preset", preset, "--seed", str(seed)]
+    learner = ["--model", model, "--preset", preset, "--seed", str(seed)]
     learner += ["--minutes", str(minutes)] if frames is None else ["--frames", str(frames)]
     launch(run, f"tcp/127.0.0.1:{_free_port()}", learner, [str(room) for room in rooms], actors, cache)
     report(run, episodes=episodes, seed=seed, cache=cache)

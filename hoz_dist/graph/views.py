@@ -1,14 +1,11 @@
 """Views: what was seen from where."""
 
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hoz_dist.nav.pose import PITCHES, YAWS
-
-VIEWS_PER_POSITION: Final = len(YAWS) * len(PITCHES)
-"""View index within a room: ``(position * 8 + yaw index) * 2 + pitch index``."""
+from hoz_dist.nav.pose import VIEWS_PER_POSITION
 
 
 class Views(NamedTuple):

@@ -12,7 +12,7 @@ SEEN_PICTURE_SIZE: Final = 128
 
 
 def seen_pixels(picture_size: int) -> float:
-    """Return the least number of pixels of a seen object in a square picture of that side, in proportion to its area."""
+    """Return the least number of pixels of a seen object in a square picture of that side, in proportion to area."""
     return SEEN_PIXELS * (picture_size / SEEN_PICTURE_SIZE) ** 2
 
 

@@ -8,6 +8,8 @@ YAWS: Final[tuple[int, ...]] = tuple(range(0, 360, 45))
 """Yaw angles, degrees; 0 looks along +z, 90 along +x."""
 PITCHES: Final[tuple[int, ...]] = (0, 30)
 """Pitch angles, degrees down."""
+VIEWS_PER_POSITION: Final = len(YAWS) * len(PITCHES)
+"""View index within a room: ``(position * 8 + yaw index) * 2 + pitch index``."""
 CAMERA_HEIGHT_M: Final = 1.58
 FIELD_OF_VIEW_DEG: Final = 90.0
 PICTURE_SIZE: Final = 64

@@ -5,7 +5,7 @@ A *view* is the index of a pose: ``view = (position * 8 + yaw_index) * 2 + pitch
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,12 +14,10 @@ from scipy.sparse.csgraph import connected_components
 
 from hoz_dist.errors import InvalidValueError
 from hoz_dist.nav.actions import Action
-from hoz_dist.nav.pose import GRID_M, HEADINGS, PITCHES, YAWS, Pose
+from hoz_dist.nav.pose import GRID_M, HEADINGS, PITCHES, VIEWS_PER_POSITION, YAWS, Pose
 
 if TYPE_CHECKING:  # processes that only look views up do without PyBullet
     from hoz_dist.sim.world import World
-
-VIEWS_PER_POSITION: Final = len(YAWS) * len(PITCHES)
 
 
 @dataclass(frozen=True, eq=False)

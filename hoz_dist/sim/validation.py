@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 
 from hoz_dist.nav.categories import SCENE_TARGETS, SCENES, TARGETS
 from hoz_dist.nav.episode import SUCCESS_DISTANCE_M
-from hoz_dist.nav.pose import GRID_M
+from hoz_dist.nav.pose import GRID_M, VIEWS_PER_POSITION
 from hoz_dist.nav.rooms import SPLITS, RoomId
 from hoz_dist.sim.camera import Camera
 from hoz_dist.sim.catalogue import CATALOGUE_PATH, Entry, targets_of
 from hoz_dist.sim.detections import Detector
 from hoz_dist.sim.generator import generate_room
-from hoz_dist.sim.pose_graph import VIEWS_PER_POSITION, PoseGraph, build_pose_graph
+from hoz_dist.sim.pose_graph import PoseGraph, build_pose_graph
 from hoz_dist.sim.room import Room
 from hoz_dist.sim.world import World
 

@@ -23,7 +23,8 @@ import xxhash
 from numpy.typing import NDArray
 
 from hoz_dist.errors import DamagedFileError
-from hoz_dist.sim.pose_graph import VIEWS_PER_POSITION, PoseGraph
+from hoz_dist.nav.pose import VIEWS_PER_POSITION
+from hoz_dist.sim.pose_graph import PoseGraph
 
 _HEADER: Final = "header.json"
 _CHECKSUMS: Final = "checksums.npy"

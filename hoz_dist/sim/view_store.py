@@ -25,13 +25,13 @@ from numpy.typing import NDArray
 from hoz_dist.errors import DamagedFileError, InvalidValueError
 from hoz_dist.nav.categories import SCENE_TARGETS, category_index
 from hoz_dist.nav.encoder import VisualEncoder
-from hoz_dist.nav.pose import PICTURE_SIZE
+from hoz_dist.nav.pose import PICTURE_SIZE, VIEWS_PER_POSITION
 from hoz_dist.nav.rooms import RoomId
 from hoz_dist.sim.appearance import appearance
 from hoz_dist.sim.catalogue import load_room
 from hoz_dist.sim.detections import Detector
 from hoz_dist.sim.painter import Painter
-from hoz_dist.sim.pose_graph import VIEWS_PER_POSITION, PoseGraph
+from hoz_dist.sim.pose_graph import PoseGraph
 from hoz_dist.sim.room import Room
 from hoz_dist.sim.room_views import RoomViews
 from hoz_dist.sim.view_folder import Frames, ViewFolder

@@ -19,7 +19,7 @@ def test_without_options_the_configuration_is_the_default_one() -> None:
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (["--method", "magic"], "Unknown method 'magic'"),
+        (["--model", "magic"], "Unknown method 'magic'"),
         (["--zones", "1"], "'zones' is 1"),
         (["--minutes", "1", "--frames", "2"], "either minutes or frames"),
         (["--encoder", "resnet18"], "--weights"),
