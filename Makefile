@@ -28,7 +28,7 @@ check: install-dev  ## Check style, types and the direction of imports.
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
-	$(BIN)/lint-imports --no-timing --no-logo
+	$(BIN)/lint-imports --no-logo
 
 format: install-dev  ## Format the code and mend what can be mended by itself.
 	$(BIN)/ruff check --fix

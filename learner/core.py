@@ -38,6 +38,8 @@ from learner.optimizer import FlatAdam, Vector, gradient_norm, lag_weight
 from learner.replay import Schedule, UpdateRecord
 from learner.statistics import Statistics
 
+LOSS_TERMS: Final = ("policy_loss", "value_loss", "entropy", "scene_loss")
+"""Fields of `EpisodesPush` that are recorded for TensorBoard."""
 GRAPH_CHECKPOINT_SECONDS: Final = 2.0
 """A new room graph is saved this soon: rooms are few, and each took an actor a whole exploration."""
 
@@ -141,6 +143,7 @@ class LearnerCore:
             "success": statistics.success(),
             "lag": {"min": lag.minimum, "mean": round(lag.mean, 2), "max": lag.maximum, "bound": self.config.max_lag},
             "learning_rate": self.learning_rate,
+            "losses": dict(statistics.losses),
             "progress": progress,
             "budget": {"minutes": self.config.minutes, "frames": self.config.frames},
             "seconds": round(self.seconds(now), 1),
@@ -234,6 +237,7 @@ class LearnerCore:
             return
         self._seen.add(sender, push.sequence)
         actor = self.statistics.actor(push.actor, now)
+        self.statistics.losses = {name: getattr(push, name) for name in LOSS_TERMS}
         for episode in push.episodes:
             actor.rooms.add(str(episode.room))
             self.statistics.finished(episode.room.scene, success=episode.success)

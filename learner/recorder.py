@@ -34,6 +34,7 @@ class ScalarRecorder:
             "train/learning_rate": status["learning_rate"],
         }
         scalars |= {f"success_{scene}/train": rate for scene, rate in success["scenes"].items()}
+        scalars |= {f"loss/{name}": value for name, value in status["losses"].items()}
         for tag, value in scalars.items():
             if value is not None:
                 self._writer.add_scalar(tag, value, status["frames"])

@@ -82,6 +82,8 @@ class Statistics:
         self.episodes = episodes
         self.recent: deque[tuple[str, bool]] = deque(recent, maxlen=SUCCESS_WINDOW)
         """(scene, success) of the last episodes."""
+        self.losses: dict[str, float] = {}
+        """Terms of the loss as an actor last reported them, by name."""
         self.duplicates = 0
         """Pushes that were sent again although they had counted, since the process started."""
         self.actors: OrderedDict[str, ActorStatistics] = OrderedDict()

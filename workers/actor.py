@@ -8,6 +8,7 @@ import logging
 import threading
 import time
 import zlib
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Final
@@ -43,6 +44,8 @@ class _Report:
     frames: int = 0
     updates: int = 0
     lag: int = 0
+    losses: Counter[str] = field(default_factory=Counter)
+    """Sums of the terms of the loss."""
     episodes: list[EpisodeResult] = field(default_factory=list)
 
 
@@ -151,6 +154,7 @@ class Actor:
         report.frames += update.frames
         report.updates += 1
         report.lag += max(lag, 0)
+        report.losses.update(update.loss.terms())
         report.episodes += update.finished
         if report.updates < REPORT_UPDATES:
             return True
@@ -159,6 +163,7 @@ class Actor:
             frames=report.frames,
             frames_per_second=report.frames / (time.monotonic() - report.began),
             lag=report.lag / report.updates,
+            losses={name: total / report.updates for name, total in report.losses.items()},
         )
         self._report = _Report()
         return not (isinstance(reply, Refused) and reply.reason == Reason.FINISHED)

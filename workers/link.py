@@ -3,7 +3,7 @@
 import secrets
 import threading
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from types import TracebackType
 from typing import Self
@@ -120,9 +120,23 @@ class LearnerLink:
         return self._pusher.push(self._keys.grads(self._actor), push)
 
     def push_episodes(
-        self, episodes: Sequence[EpisodeResult], *, frames: int, frames_per_second: float, lag: float
+        self,
+        episodes: Sequence[EpisodeResult],
+        *,
+        frames: int,
+        frames_per_second: float,
+        lag: float,
+        losses: Mapping[str, float],
     ) -> Accepted | Refused:
-        """Push how episodes ended and how fast the actor is; see `EpisodesPush`."""
+        """Push how episodes ended and how the training goes.
+
+        Args:
+            episodes: Results, in the order in which the episodes ended.
+            frames: Environment frames since the last push.
+            frames_per_second: Speed since then.
+            lag: Mean policy lag since then, versions.
+            losses: Means of the terms of the loss since then: ``policy_loss, value_loss, entropy, scene_loss``.
+        """
         push = EpisodesPush(
             actor=self._actor,
             incarnation=self._incarnation,
@@ -131,6 +145,7 @@ class LearnerLink:
             frames_per_second=frames_per_second,
             lag=lag,
             episodes=tuple(episodes[:MAX_EPISODES]),
+            **losses,
         )
         return self._pusher.push(self._keys.rollouts(self._actor), push)
 

@@ -32,6 +32,15 @@ class Loss(NamedTuple):
     entropy: float
     scene: float
 
+    def terms(self) -> dict[str, float]:
+        """Return the terms by the names that are reported."""
+        return {
+            "policy_loss": self.policy,
+            "value_loss": self.value,
+            "entropy": self.entropy,
+            "scene_loss": self.scene,
+        }
+
 
 def a3c_loss(
     rollout: Rollout,

@@ -3,10 +3,10 @@
 from typing import Final, NamedTuple
 
 import numpy as np
-import pybullet
 from numpy.typing import NDArray
 
 from hoz_dist.nav.pose import CAMERA_HEIGHT_M, FIELD_OF_VIEW_DEG, PICTURE_SIZE, Pose
+from hoz_dist.sim.bullet import pybullet
 from hoz_dist.sim.world import World
 
 NEAR_M: Final = 0.05

@@ -4,10 +4,10 @@ from types import TracebackType
 from typing import Final, Self
 
 import numpy as np
-import pybullet
 from numpy.typing import NDArray
 
 from hoz_dist.nav.pose import AGENT_RADIUS_M
+from hoz_dist.sim.bullet import pybullet
 from hoz_dist.sim.room import Item, Room
 
 MAX_PARTS: Final = 16

@@ -94,6 +94,10 @@ class EpisodesPush(Push):
         frames_per_second: Its speed since then.
         lag: Mean policy lag of its gradients since then, in parameter versions.
         episodes: Results, in the order in which the episodes ended.
+        policy_loss: Mean policy loss of its gradients since then.
+        value_loss: Mean value loss, likewise.
+        entropy: Mean entropy of the policy, nats, likewise.
+        scene_loss: Mean cross-entropy of the scene layer, nats, likewise; 0 without the layer.
     """
 
     KIND: ClassVar[str] = "episodes"
@@ -103,6 +107,10 @@ class EpisodesPush(Push):
     frames_per_second: Annotated[float, Real(0.0)]
     lag: Annotated[float, Real(0.0)]
     episodes: Annotated[tuple[EpisodeResult, ...], _EPISODES]
+    policy_loss: Annotated[float, Real()] = 0.0
+    value_loss: Annotated[float, Real()] = 0.0
+    entropy: Annotated[float, Real()] = 0.0
+    scene_loss: Annotated[float, Real()] = 0.0
 
 
 @dataclass(frozen=True, eq=False)

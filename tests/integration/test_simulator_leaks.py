@@ -3,9 +3,9 @@
 from pathlib import Path
 
 import numpy as np
-import pybullet
 import pytest
 
+from hoz_dist.sim.bullet import pybullet
 from hoz_dist.sim.gym_env import ObjectNavEnv
 from hoz_dist.sim.live import LiveViews
 from hoz_dist.sim.painter import Painter

@@ -4,12 +4,12 @@ import dataclasses
 import statistics
 
 import numpy as np
-import pybullet
 import pytest
 
 from hoz_dist.nav.categories import SCENES
 from hoz_dist.nav.pose import GRID_M, Pose
 from hoz_dist.nav.rooms import RoomId
+from hoz_dist.sim.bullet import pybullet
 from hoz_dist.sim.camera import FAR_M, Camera
 from hoz_dist.sim.catalogue import load_room
 from hoz_dist.sim.pose_graph import build_pose_graph

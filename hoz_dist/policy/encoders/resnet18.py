@@ -87,4 +87,4 @@ def _read(weights: Path) -> dict[str, Tensor]:
     except Exception as error:  # safetensors and torch raise a dozen kinds for a file that is not theirs
         message = f"{weights} cannot be read as weights; give the .safetensors or .pth file that torchvision publishes."
         raise DamagedFileError(message) from error
-    return state
+    return dict(state)

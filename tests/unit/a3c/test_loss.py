@@ -19,7 +19,7 @@ def test_a_step_along_the_gradient_favours_actions_that_went_well() -> None:
         bootstrap=torch.zeros(2),
     )
     logits = torch.zeros(1, 2, 6, requires_grad=True)
-    a3c_loss(rollout, logits, torch.zeros(1, 2), WEIGHTS).total.backward()
+    a3c_loss(rollout, logits, torch.zeros(1, 2), WEIGHTS).total.backward()  # type: ignore[no-untyped-call]
     assert logits.grad is not None
     assert logits.grad[0, 0, 2] < 0 < logits.grad[0, 1, 4]
 
@@ -27,7 +27,8 @@ def test_a_step_along_the_gradient_favours_actions_that_went_well() -> None:
 def test_the_value_moves_to_the_return() -> None:
     rollout = make_rollout(steps=4, batch=3, seed=1)
     values = rollout.values.clone().requires_grad_()
-    a3c_loss(rollout, torch.zeros(4, 3, 6), values, WEIGHTS._replace(value=1.0)).total.backward()
+    a3c_loss(rollout, torch.zeros(4, 3, 6), values, WEIGHTS._replace(value=1.0)).total.backward()  # type: ignore[no-untyped-call]
+    assert values.grad is not None
     after = a3c_loss(rollout, torch.zeros(4, 3, 6), values.detach() - 0.5 * values.grad, WEIGHTS)
     assert after.value < a3c_loss(rollout, torch.zeros(4, 3, 6), rollout.values, WEIGHTS).value
 
@@ -37,7 +38,7 @@ def test_steps_that_only_reset_do_not_count() -> None:
     assert not rollout.valid.all()
     logits = torch.randn(6, 5, 6, requires_grad=True)
     values = torch.randn(6, 5, requires_grad=True)
-    a3c_loss(rollout, logits, values, WEIGHTS._replace(value=1.0, entropy=1.0)).total.backward()
+    a3c_loss(rollout, logits, values, WEIGHTS._replace(value=1.0, entropy=1.0)).total.backward()  # type: ignore[no-untyped-call]
     assert logits.grad is not None
     assert values.grad is not None
     assert logits.grad[~rollout.valid].abs().max() == 0.0
@@ -55,6 +56,6 @@ def test_scene_labels_train_the_scene_layer() -> None:
     scene_logits = torch.zeros(2, 2, 4, requires_grad=True)
     labels = torch.full((2, 2), 3)
     arguments = (rollout, torch.zeros(2, 2, 6), torch.zeros(2, 2), WEIGHTS._replace(scene=1.0), scene_logits, labels)
-    a3c_loss(*arguments).total.backward()
+    a3c_loss(*arguments).total.backward()  # type: ignore[no-untyped-call]
     assert scene_logits.grad is not None
     assert (scene_logits.grad[..., 3] < 0).all()

@@ -52,7 +52,7 @@ def unroll_once(policy: ActorCritic, bank: GraphBank) -> None:
     loss = unrolled.logits.square().sum() + unrolled.values.sum()
     if unrolled.scene_logits is not None:
         loss = loss + unrolled.scene_logits.square().sum()
-    loss.backward()
+    loss.backward()  # type: ignore[no-untyped-call]
 
 
 @pytest.mark.parametrize("method", ["a3c", "object", "hoz"])
