@@ -7,7 +7,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
 
-DEMO ?= train --run runs/demo --minutes 8
+DEMO ?= train --run runs/demo --minutes 10
 
 .DEFAULT_GOAL := help
 .PHONY: help demo test test-long check format install install-dev clean

@@ -21,6 +21,7 @@ from hoz_dist.nav.encoder import VisualEncoder
 from hoz_dist.nav.episode import EpisodeResult
 from hoz_dist.nav.rooms import RoomId
 from hoz_dist.sim.batch_env import BatchEnv
+from hoz_dist.sim.view_source import ViewSource
 from hoz_dist.sim.view_store import ViewStore
 from hoz_dist.wire.messages import Accepted, Refused
 from hoz_dist.wire.rejection import Reason
@@ -57,6 +58,7 @@ class Actor:
         rooms: Rooms to train in.
         store: The view store.
         encoder: The visual encoder, the one of the run.
+        source: Where observations come from: stored views, or PyBullet at every step.
         name: Name of the actor; with the run's seed it seeds the episodes and actions.
         stop: Ends the work at the next step.
     """
@@ -67,6 +69,7 @@ class Actor:
         rooms: Sequence[RoomId],
         store: ViewStore,
         encoder: VisualEncoder,
+        source: ViewSource,
         name: str,
         stop: threading.Event,
     ) -> None:
@@ -75,7 +78,7 @@ class Actor:
         self._link = link
         self._stop = stop
         self._preparation = RoomPreparation(rooms, store, encoder, zones=config.zones, actor=name)
-        self._env = BatchEnv(config.batch, rng)
+        self._env = BatchEnv(config.batch, rng, source=source)
         self._collector = Collector(config, self._env, rng)
         self._graph_versions: dict[str, tuple[int, int]] = {}
         self._report = _Report()

@@ -37,6 +37,7 @@ from hoz_dist.nav.categories import SCENES
     help="Weights of the resnet18 encoder, .safetensors or .pth.  [default: none needed]",
 )
 @cache_option
+@click.option("--live", is_flag=True, help="Render every step in PyBullet instead of looking it up; slow.")
 def actor_command(
     scenes: tuple[str, ...],
     connect: str,
@@ -44,6 +45,8 @@ def actor_command(
     name: str | None,
     weights: Path | None,
     cache: Path | None,
+    *,
+    live: bool,
 ) -> None:
     """Explore and train in training rooms for the learner at ENDPOINT, until the run is over.
 
@@ -52,6 +55,7 @@ def actor_command(
     import logging
     import signal
     import threading
+    from contextlib import ExitStack
 
     from hoz_dist.nav.rooms import training_rooms
     from hoz_dist.wire.session import open_client
@@ -66,6 +70,8 @@ def actor_command(
         import torch
 
         from hoz_dist.evaluation.loading import matching_encoder
+        from hoz_dist.sim.live import LiveViews
+        from hoz_dist.sim.view_source import StoredViews
         from hoz_dist.sim.view_store import ViewStore, default_cache
         from workers.actor import Actor
         from workers.link import LearnerLink
@@ -73,8 +79,10 @@ def actor_command(
         # A process is one thread: actors share the cores, and one thread adds up the same way every time.
         torch.set_num_threads(1)
         actor = name or f"{socket.gethostname()}-{os.getpid()}"
-        with LearnerLink(session, actor, run, stop) as link:
+        with LearnerLink(session, actor, run, stop) as link, ExitStack() as stack:
+            size = link.config.picture_size
             encoder = matching_encoder(link.config, weights)
-            store = ViewStore(cache or default_cache(), link.config.picture_size)
+            store = ViewStore(cache or default_cache(), size)
+            source = stack.enter_context(LiveViews(encoder, size)) if live else StoredViews()
             logging.getLogger("hoz_dist").info("%s joins run %s with %d rooms", actor, link.run, len(rooms))
-            Actor(link, rooms, store, encoder, actor, stop).run()
+            Actor(link, rooms, store, encoder, source, actor, stop).run()

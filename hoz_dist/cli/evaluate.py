@@ -31,6 +31,7 @@ from hoz_dist.nav.categories import SCENES
     "--weights", type=click.Path(path_type=Path), help="Weights of the resnet18 encoder.  [default: none needed]"
 )
 @cache_option
+@click.option("--live", is_flag=True, help="Render every step in PyBullet instead of looking it up; slow.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON, in percent, instead of a table.")
 def evaluate_command(
     checkpoint: Path,
@@ -42,6 +43,7 @@ def evaluate_command(
     weights: Path | None,
     cache: Path | None,
     *,
+    live: bool,
     as_json: bool,
 ) -> None:
     """Measure CHECKPOINT, a checkpoint file or a run folder, against Random and Oracle.
@@ -62,6 +64,7 @@ def evaluate_command(
         scenes=scenes,
         weights=weights,
         cache=cache,
+        live=live,
     ).comparison
     if as_json:
         click.echo(json.dumps(comparison.to_json(), indent=2))

@@ -17,18 +17,15 @@ START_S: Final = 60.0
 POLL_S: Final = 1.0
 
 
-def launch(
-    run: Path, endpoint: str, learner: Sequence[str], rooms: Sequence[str], actors: int, cache: Path | None
-) -> None:
+def launch(run: Path, endpoint: str, learner: Sequence[str], actor: Sequence[str], actors: int) -> None:
     """Train until the run's budget is used up.
 
     Args:
         run: Folder of the run.
         endpoint: Where the learner listens.
         learner: Further options of the learner.
-        rooms: Rooms of every actor.
+        actor: Further options of every actor.
         actors: Number of actors.
-        cache: Folder of the view store; the default one when None.
 
     Raises:
         HozError: A process failed; its own words are in the sentence.
@@ -43,9 +40,7 @@ def launch(
             with _connect(endpoint, core) as client:
                 for number in range(actors):
                     name = f"actor-{number}"
-                    places = [word for room in rooms for word in ("--scene", room)]
-                    options = ["actor", "--connect", endpoint, "--name", name, *places]
-                    options += [] if cache is None else ["--cache", str(cache)]
+                    options = ["actor", "--connect", endpoint, "--name", name, *actor]
                     children.start(name, options, run / f"{name}.log")
                 _watch(client, core, children)
     finally:

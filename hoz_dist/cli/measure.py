@@ -1,16 +1,21 @@
 """Measures a checkpoint and shows the progress: what `hoz-dist evaluate` and the end of `hoz-dist train` share."""
 
+import os
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
 from hoz_dist.cli.progress import Progress
+from hoz_dist.cli.rendering import Encoding, render_rooms
 from hoz_dist.errors import NotFoundError
 from hoz_dist.evaluation.agents import PolicyAgent
 from hoz_dist.evaluation.benchmark import Benchmark, Comparison, compare
-from hoz_dist.evaluation.loading import load_agent, matching_encoder, open_rooms
+from hoz_dist.evaluation.loading import load_agent, matching_encoder
 from hoz_dist.nav.categories import SCENES, scene_index
-from hoz_dist.nav.rooms import SPLITS, Split
+from hoz_dist.nav.rooms import Split, rooms_of
+from hoz_dist.sim.live import LiveViews
+from hoz_dist.sim.view_source import StoredViews
 from hoz_dist.sim.view_store import ViewStore, default_cache
 from learner.checkpoint import Checkpoint
 
@@ -32,6 +37,7 @@ def measure(
     scenes: Sequence[str] = (),
     weights: Path | None = None,
     cache: Path | None = None,
+    live: bool = False,
 ) -> Measurement:
     """Run a checkpoint's agent, Random and Oracle on the same episodes.
 
@@ -43,6 +49,7 @@ def measure(
         scenes: Scenes; those that the checkpoint was trained in when there are none.
         weights: Weights of the resnet18 encoder.
         cache: Folder of the view store; the default one when None.
+        live: Render what the policy sees at every step, instead of looking it up.
 
     Raises:
         HozError: A scene does not exist, the checkpoint holds no scene, or its parts do not fit.
@@ -61,18 +68,16 @@ def measure(
     config = checkpoint.config
     agent = load_agent(config, checkpoint.parameters, checkpoint.scene_graphs())
     encoder = matching_encoder(config, weights)
-    store = ViewStore(cache or default_cache(), config.picture_size)
-    opened = 0
-    with Progress("Opening rooms", len(wanted) * len(SPLITS[split]), "rooms") as progress:
-
-        def show_room(room: str) -> None:
-            nonlocal opened
-            opened += 1
-            progress.update(opened, room)
-
-        rooms = open_rooms(store, encoder, wanted, split, show_room)
+    folder = cache or default_cache()
+    store = ViewStore(folder, config.picture_size)
+    names = [room for scene in wanted for room in rooms_of(scene, split)]
+    missing = [room for room in names if not store.holds(room, encoder)]
+    if missing:
+        render_rooms(missing, folder, config.picture_size, os.cpu_count() or 1, Encoding(config.encoder, weights))
+    rooms = [store.open(room, encoder) for room in names]
     benchmark = Benchmark.of(rooms, split, episodes)
     trials = 2 * len(seeds) + 1  # of Random and the policy; Oracle draws nothing and has one
     with Progress("Evaluating", len(benchmark.episodes) * trials, "episodes") as progress:
-        comparison = compare(benchmark, agent, list(seeds), progress.update)
+        source = partial(LiveViews, encoder, config.picture_size) if live else StoredViews
+        comparison = compare(benchmark, agent, list(seeds), source, progress.update)
     return Measurement(comparison, benchmark, agent)

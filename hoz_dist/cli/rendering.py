@@ -17,6 +17,7 @@ from hoz_dist.errors import HozError, InvalidValueError
 from hoz_dist.nav.pose import GRID_M, YAWS, Pose
 from hoz_dist.nav.rooms import RoomId
 from hoz_dist.policy.encoders import load_encoder
+from hoz_dist.policy.settings import EncoderName
 from hoz_dist.sim.view_store import ViewStore
 
 SHEET_COLUMNS: Final = 8
@@ -40,14 +41,22 @@ class _Report(NamedTuple):
     """Why the room cannot be rendered; empty when it can."""
 
 
-def render_rooms(rooms: Sequence[RoomId], cache: Path, picture_size: int, jobs: int) -> int:
-    """Render the views of rooms that the cache lacks, with the default encoder's features.
+class Encoding(NamedTuple):
+    """Which visual encoder's features are stored with the pictures."""
+
+    name: EncoderName = "pooled"
+    weights: Path | None = None
+
+
+def render_rooms(rooms: Sequence[RoomId], cache: Path, picture_size: int, jobs: int, encoding: Encoding) -> int:
+    """Render the views of rooms that the cache lacks, with an encoder's features.
 
     Args:
         rooms: The rooms, each once, at least one.
         cache: The view cache.
         picture_size: Side of the pictures, pixels.
         jobs: Processes that render at once.
+        encoding: The encoder.
 
     Returns:
         The number of views of all rooms.
@@ -61,9 +70,8 @@ def render_rooms(rooms: Sequence[RoomId], cache: Path, picture_size: int, jobs: 
     count = min(jobs, len(rooms))
     for task in [*rooms, *[None] * count]:
         tasks.put(task)
-    workers = [
-        context.Process(target=_render, args=(tasks, reports, cache, picture_size), daemon=True) for _ in range(count)
-    ]
+    arguments = (tasks, reports, cache, picture_size, encoding)
+    workers = [context.Process(target=_render, args=arguments, daemon=True) for _ in range(count)]
     for worker in workers:
         worker.start()
     try:
@@ -106,11 +114,17 @@ def contact_sheet(rooms: Iterable[RoomId], store: ViewStore) -> bytes:
     return file.getvalue()
 
 
-def _render(tasks: "SimpleQueue[RoomId | None]", reports: "Queue[_Report]", cache: Path, picture_size: int) -> None:
+def _render(
+    tasks: "SimpleQueue[RoomId | None]",
+    reports: "Queue[_Report]",
+    cache: Path,
+    picture_size: int,
+    encoding: Encoding,
+) -> None:
     """Fill the cache for one room after another; the body of a rendering process."""
     # Ctrl-C reaches every process of the terminal; the main process acts on it.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    encoder, store = load_encoder("pooled"), ViewStore(cache, picture_size)
+    encoder, store = load_encoder(*encoding), ViewStore(cache, picture_size)
     while (room := tasks.get()) is not None:
         rendered = False
 

@@ -22,13 +22,14 @@ TRAJECTORIES_FILE: Final = "trajectories.png"
 _DRAWN_PER_SCENE: Final = 2
 
 
-def report(run: Path, *, episodes: int, seed: int, cache: Path | None) -> None:
+def report(run: Path, *, episodes: int, seed: int, weights: Path | None, cache: Path | None) -> None:
     """Measure the newest checkpoint of a run, draw its graphs and some trajectories, and say what to try next.
 
     Args:
         run: Folder of the run.
         episodes: Validation episodes in each scene; 0 for none.
         seed: Seed of the actions.
+        weights: Weights of the resnet18 encoder.
         cache: Folder of the view store; the default one when None.
     """
     console = Console()
@@ -39,7 +40,7 @@ def report(run: Path, *, episodes: int, seed: int, cache: Path | None) -> None:
     )
     pictures = _draw_graphs(checkpoint, run)
     if episodes > 0:
-        measurement = measure(checkpoint, split="val", seeds=[seed], episodes=episodes, cache=cache)
+        measurement = measure(checkpoint, split="val", seeds=[seed], episodes=episodes, weights=weights, cache=cache)
         console.print(comparison_table(measurement.comparison))
         results = json.dumps(measurement.comparison.to_json(), indent=2)
         (run / RESULTS_FILE).write_text(results + "\n", encoding="utf-8")

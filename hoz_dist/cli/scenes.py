@@ -92,14 +92,14 @@ def render_command(
     Views that are there already are kept.
     """
     rooms = list(dict.fromkeys(room for name in names for room in _rooms(name, split)))
-    from hoz_dist.cli.rendering import contact_sheet, render_rooms
+    from hoz_dist.cli.rendering import Encoding, contact_sheet, render_rooms
     from hoz_dist.graph.atomic import check_writable, write_atomically
     from hoz_dist.sim.view_store import ViewStore, default_cache
 
     if output is not None:
         check_writable(output, overwrite=force)  # before minutes of work, not after
     folder = cache or default_cache()
-    views = render_rooms(rooms, folder, picture_size, jobs)
+    views = render_rooms(rooms, folder, picture_size, jobs, Encoding())
     click.echo(f"The cache {folder} holds all {views:,} views of {len(rooms)} room{'s' * (len(rooms) != 1)}.")
     if output is not None:
         write_atomically(output, contact_sheet(rooms, ViewStore(folder, picture_size)), overwrite=force)

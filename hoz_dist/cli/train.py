@@ -45,6 +45,12 @@ from hoz_dist.nav.categories import SCENES
     show_default=True,
     help="Validation episodes in each scene afterwards; 0 for no evaluation.",
 )
+@click.option("--encoder", default="pooled", show_default=True, help="Visual encoder: pooled or resnet18.")
+@click.option(
+    "--weights",
+    type=click.Path(path_type=Path),
+    help="Weights of the resnet18 encoder, .safetensors or .pth.  [default: none needed]",
+)
 @cache_option
 def train_command(
     run: Path,
@@ -56,6 +62,8 @@ def train_command(
     seed: int,
     scenes: tuple[str, ...],
     episodes: int,
+    encoder: str,
+    weights: Path | None,
     cache: Path | None,
 ) -> None:
     """Train on this machine, then measure the agent on unseen validation rooms and draw pictures.
@@ -73,10 +81,13 @@ def train_command(
         raise InvalidValueError(message)
     rooms = training_rooms(scenes or SCENES)
     minutes = 10.0 if minutes is None and frames is None else minutes
-    learner = ["--model", model, "--preset", preset, "--seed", str(seed)]
+    files = [] if weights is None else ["--weights", str(weights)]
+    learner = ["--model", model, "--preset", preset, "--encoder", encoder, "--seed", str(seed), *files]
     learner += ["--minutes", str(minutes)] if frames is None else ["--frames", str(frames)]
-    launch(run, f"tcp/127.0.0.1:{_free_port()}", learner, [str(room) for room in rooms], actors, cache)
-    report(run, episodes=episodes, seed=seed, cache=cache)
+    actor = [word for room in rooms for word in ("--scene", str(room))] + files
+    actor += [] if cache is None else ["--cache", str(cache)]
+    launch(run, f"tcp/127.0.0.1:{_free_port()}", learner, actor, actors)
+    report(run, episodes=episodes, seed=seed, weights=weights, cache=cache)
 
 
 def _free_port() -> int:

@@ -5,12 +5,13 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from hoz_dist.evaluation.agents import Agent, OracleAgent, PolicyAgent, RandomAgent
-from hoz_dist.evaluation.trials import Evaluation, run_trials
+from hoz_dist.evaluation.trials import Evaluation, SourceFactory, run_trials
 from hoz_dist.nav.categories import SCENES
 from hoz_dist.nav.episode import Episode
 from hoz_dist.nav.rooms import Split
 from hoz_dist.sim.episodes import episode_list
 from hoz_dist.sim.room_views import RoomViews
+from hoz_dist.sim.view_source import StoredViews
 
 EPISODE_SEED: Final = 2021
 """Seed of the list of episodes: the same list for every agent, trial and run."""
@@ -46,9 +47,15 @@ class Benchmark:
         present = {episode.room.scene for episode in self.episodes}
         return tuple(scene for scene in SCENES if scene in present)
 
-    def run(self, agent: Agent, seeds: Sequence[int], progress: Callable[[int, int], None] | None = None) -> Evaluation:
-        """Run one agent, one trial per seed."""
-        return run_trials(agent, self.rooms, self.episodes, seeds, split=self.split, progress=progress)
+    def run(
+        self,
+        agent: Agent,
+        seeds: Sequence[int],
+        source: SourceFactory = StoredViews,
+        progress: Callable[[int, int], None] | None = None,
+    ) -> Evaluation:
+        """Run one agent, one trial per seed; see `run_trials`."""
+        return run_trials(agent, self.rooms, self.episodes, seeds, split=self.split, source=source, progress=progress)
 
 
 @dataclass(frozen=True)
@@ -81,6 +88,7 @@ def compare(
     benchmark: Benchmark,
     policy: PolicyAgent,
     seeds: Sequence[int],
+    source: SourceFactory = StoredViews,
     progress: Callable[[int, str], None] | None = None,
 ) -> Comparison:
     """Run Random, a policy and Oracle on a benchmark.
@@ -89,11 +97,12 @@ def compare(
         benchmark: The episodes.
         policy: The policy.
         seeds: Seed of each trial's actions. Oracle draws nothing, so it has one trial.
+        source: Makes the source of the policy's observations; Random and Oracle do not look.
         progress: Called with the number of episodes that have ended in all trials, and the agent's name.
     """
     before = 0
 
-    def run(agent: Agent, trial_seeds: Sequence[int]) -> Evaluation:
+    def run(agent: Agent, trial_seeds: Sequence[int], views: SourceFactory = StoredViews) -> Evaluation:
         nonlocal before
 
         def report(done: int, total: int) -> None:
@@ -101,13 +110,13 @@ def compare(
             if progress is not None:
                 progress(before + done, agent.name)
 
-        evaluation = benchmark.run(agent, trial_seeds, report)
+        evaluation = benchmark.run(agent, trial_seeds, views, report)
         before += len(evaluation.trials) * evaluation.episodes
         return evaluation
 
     return Comparison(
         random=run(RandomAgent(), seeds),
-        policy=run(policy, seeds),
+        policy=run(policy, seeds, source),
         oracle=run(OracleAgent(list(benchmark.rooms)), seeds[:1]),
         scenes=benchmark.scenes,
     )

@@ -1,6 +1,6 @@
 """From a run's configuration, parameters and graphs to an agent; from a split to rooms."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -11,12 +11,9 @@ from hoz_dist.errors import DamagedFileError, InvalidValueError, NotFoundError
 from hoz_dist.evaluation.agents import PolicyAgent
 from hoz_dist.graph.scene_graph import SceneGraph
 from hoz_dist.nav.encoder import VisualEncoder
-from hoz_dist.nav.rooms import Split, rooms_of
 from hoz_dist.policy.encoders import load_encoder
 from hoz_dist.policy.graph_bank import GraphBank
 from hoz_dist.policy.parameters import FlatParameters, make_policy
-from hoz_dist.sim.room_views import RoomViews
-from hoz_dist.sim.view_store import ViewStore
 
 
 def load_agent(config: RunConfig, parameters: NDArray[np.float32], graphs: Mapping[str, SceneGraph]) -> PolicyAgent:
@@ -54,27 +51,3 @@ def matching_encoder(config: RunConfig, weights: Path | None) -> VisualEncoder:
         message = f"The run's encoder is {config.encoder_key}, not {encoder.key}; give the same file to --weights."
         raise InvalidValueError(message)
     return encoder
-
-
-def open_rooms(
-    store: ViewStore,
-    encoder: VisualEncoder,
-    scenes: Sequence[str],
-    split: Split,
-    progress: Callable[[str], None] | None = None,
-) -> list[RoomViews]:
-    """Open all rooms of some scenes in a split, rendering those that are not in the store yet.
-
-    Args:
-        store: The view store.
-        encoder: The visual encoder.
-        scenes: Scenes.
-        split: Split.
-        progress: Called with the name of each room that is open.
-    """
-    rooms = []
-    for room in (room for scene in scenes for room in rooms_of(scene, split)):
-        rooms.append(store.open(room, encoder))
-        if progress is not None:
-            progress(str(room))
-    return rooms

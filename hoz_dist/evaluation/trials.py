@@ -2,6 +2,7 @@
 
 import statistics
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,6 +14,10 @@ from hoz_dist.nav.episode import Episode, EpisodeResult
 from hoz_dist.nav.metrics import Metrics, long_episodes, metrics_of
 from hoz_dist.sim.episode_runner import EpisodeRunner
 from hoz_dist.sim.room_views import RoomViews
+from hoz_dist.sim.view_source import StoredViews, ViewSource
+
+SourceFactory = Callable[[], ViewSource]
+"""Makes a new source of observations; one that is a context manager is closed after use."""
 
 
 @dataclass(frozen=True)
@@ -53,6 +58,7 @@ def run_trials(
     seeds: Iterable[int],
     *,
     split: str,
+    source: SourceFactory = StoredViews,
     progress: Callable[[int, int], None] | None = None,
 ) -> Evaluation:
     """Run an agent over all episodes, once for each seed.
@@ -63,18 +69,23 @@ def run_trials(
         episodes: What to run; every one counts.
         seeds: Seed of the actions of each trial.
         split: The split that the rooms belong to, for the report.
+        source: Makes the source of a trial's observations: stored views, or PyBullet at every step.
         progress: Called with the number of episodes that have ended and the number of all.
     """
     all_seeds = list(seeds)
     total = len(all_seeds) * len(episodes)
     trials = []
     for number, seed in enumerate(all_seeds):
-        runner = EpisodeRunner(rooms, episodes)
-        agent.begin(runner, np.random.default_rng(seed))
-        while runner.active.any():
-            runner.step(agent.act(runner))
-            if progress is not None:
-                progress(number * len(episodes) + int((~runner.active).sum()), total)
+        with ExitStack() as stack:
+            views = source()
+            if isinstance(views, AbstractContextManager):
+                stack.enter_context(views)
+            runner = EpisodeRunner(rooms, episodes, source=views)
+            agent.begin(runner, np.random.default_rng(seed))
+            while runner.active.any():
+                runner.step(agent.act(runner))
+                if progress is not None:
+                    progress(number * len(episodes) + int((~runner.active).sum()), total)
         trials.append(tuple(runner.results()))
     return Evaluation(agent.name, split, tuple(trials))
 

@@ -104,6 +104,14 @@ class ViewStore:
         targets = tuple(target for target in sorted(asked_for) if arrays["success"][:, target].any())
         return RoomViews(room=room, digest=content.digest, graph=folder.graph, targets=targets, **arrays)
 
+    def holds(self, room: RoomId, encoder: VisualEncoder) -> bool:
+        """Tell whether `open` would find all of a room in the cache."""
+        try:
+            folder = ViewFolder.open(self._path(self._load_room(room)), self._size)
+        except DamagedFileError:
+            return False
+        return folder.load_derived(_derived_name(encoder)) is not None
+
     def frames(self, room: RoomId, views: NDArray[np.integer] | None = None) -> Frames:
         """Return pictures, rendering those positions that the cache lacks.
 

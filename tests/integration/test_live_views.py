@@ -50,5 +50,5 @@ def test_stored_and_live_episodes_are_the_same(cache: Path) -> None:
             ended += len(step.finished)
         assert 0 < successes < ended
         parts = [np.stack(parts) for parts in zip(*observed, strict=True)]
-        for one, other in zip(parts, live.gather(np.stack(visited), *parts[3:]), strict=True):
-            assert np.array_equal(one, other)
+        for part, again in zip(parts, live.gather(np.stack(visited), *parts[3:]), strict=True):
+            assert np.array_equal(part, again)
