@@ -77,7 +77,7 @@ class RunConfig:
     @property
     def policy(self) -> PolicySettings:
         """The settings of the policy network."""
-        return PolicySettings.of(self.method, self.preset, channels=self.channels)
+        return PolicySettings.of(self.method, self.preset, channels=self.channels, zones=self.zones)
 
     def to_json(self) -> dict[str, Any]:
         """Return the configuration as JSON values."""

@@ -1,6 +1,6 @@
 """What the learner decides: events in, effects out. No input or output, no clock, no threads.
 
-    core = LearnerCore(config, initial_parameters(config), epoch=1)
+    core = LearnerCore(config, initial_parameters(config.policy, config.seed), epoch=1)
     for effect in core.handle(GradientReceived(request=7, push=push), now=time.monotonic()):
         ...  # carried out by `learner.service`
 

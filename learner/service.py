@@ -107,7 +107,7 @@ def serve(settings: LearnerSettings, stop: threading.Event) -> None:
             schedule = schedule[checkpoint.version :]
         core = LearnerCore(
             settings.config,
-            initial_parameters(settings.config),
+            initial_parameters(settings.config.policy, settings.config.seed),
             epoch=folder.epoch,
             checkpoint=checkpoint,
             room_digests=catalogue_digests(),

@@ -43,7 +43,7 @@ class Collector:
         self._config = config
         self._env = env
         self._rng = rng
-        self._policy: ActorCritic = make_policy(config)
+        self._policy: ActorCritic = make_policy(config.policy, config.seed)
         self.parameters = FlatParameters(self._policy)
         self.bank = GraphBank(config.zones, config.edge_cost)
         self._state: State = self._policy.initial_state(config.batch)

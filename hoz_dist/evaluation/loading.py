@@ -28,7 +28,7 @@ def load_agent(config: RunConfig, parameters: NDArray[np.float32], graphs: Mappi
         DamagedFileError: The parameters are not those of the configuration's network.
         NotFoundError: The method is guided by graphs and there is none.
     """
-    policy = make_policy(config)
+    policy = make_policy(config.policy, config.seed)
     try:
         FlatParameters(policy).load(parameters)
     except ValueError as error:

@@ -98,10 +98,9 @@ class _Inputs(NamedTuple):
 class ActorCritic(nn.Module):
     """Policy and value function."""
 
-    def __init__(self, settings: PolicySettings, zones: int) -> None:
+    def __init__(self, settings: PolicySettings) -> None:
         super().__init__()
         self.settings = settings
-        self.zones = zones
         sizes, categories = settings.sizes, len(TARGETS)
         context = sizes.target + sizes.action
         context += sizes.zones * settings.zone_layer + len(SCENES) * settings.scene_layer
@@ -124,7 +123,7 @@ class ActorCritic(nn.Module):
 
     def initial_state(self, batch: int) -> State:
         """Return the state before any episode's first step."""
-        return State(self.lstm.initial_state(batch), initial_zone_state(batch, self.zones))
+        return State(self.lstm.initial_state(batch), initial_zone_state(batch, self.settings.zones))
 
     @torch.no_grad()
     def act(self, observation: Observation, state: State, bank: GraphBank) -> Decision:
@@ -188,7 +187,7 @@ class ActorCritic(nn.Module):
     ) -> Tensor:
         """Return delta_t of every step, [T, B, K, N]; the gradient reaches lambda."""
         nodes, over_time = zone.nodes, []
-        chosen = functional.one_hot(guidance.current, self.zones).float()
+        chosen = functional.one_hot(guidance.current, self.settings.zones).float()
         for t in range(len(bags)):
             fresh = guidance.fresh[t]
             if fresh.any():

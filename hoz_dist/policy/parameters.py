@@ -9,8 +9,8 @@ import torch
 from numpy.typing import NDArray
 from torch import nn
 
-from hoz_dist.config import RunConfig
 from hoz_dist.policy.actor_critic import ActorCritic
+from hoz_dist.policy.settings import PolicySettings
 
 
 class FlatParameters:
@@ -47,14 +47,14 @@ class FlatParameters:
         self.values.numpy()[:] = vector
 
 
-def make_policy(config: RunConfig) -> ActorCritic:
-    """Make the network of a run, with the initial parameters that follow from its seed."""
+def make_policy(settings: PolicySettings, seed: int) -> ActorCritic:
+    """Make a network whose initial parameters follow from a seed."""
     # A generator of its own would have to reach every layer's initialisation; forking keeps the caller's stream intact.
     with torch.random.fork_rng(devices=[]):
-        torch.manual_seed(config.seed)
-        return ActorCritic(config.policy, config.zones)
+        torch.manual_seed(seed)
+        return ActorCritic(settings)
 
 
-def initial_parameters(config: RunConfig) -> NDArray[np.float32]:
-    """Return the initial parameters of a run, [P]; they follow from the configuration alone."""
-    return FlatParameters(make_policy(config)).values.numpy()
+def initial_parameters(settings: PolicySettings, seed: int) -> NDArray[np.float32]:
+    """Return the initial parameters of a network, [P]; they follow from the arguments alone."""
+    return FlatParameters(make_policy(settings, seed)).values.numpy()

@@ -49,14 +49,17 @@ class PolicySettings:
     scene_layer: bool = True
     zone_layer: bool = True
     done_reminder: bool = True
+    zones: int = 8
+    """K of the scene graphs."""
 
     @classmethod
-    def of(cls, method: Method, preset: Preset, *, channels: int) -> "PolicySettings":
+    def of(cls, method: Method, preset: Preset, *, channels: int, zones: int) -> "PolicySettings":
         """Return the settings of a method: ``a3c`` < ``object`` < ``hoz``, each with more layers."""
         hoz = method == "hoz"
         return cls(
             sizes=PRESETS[preset],
             channels=channels,
+            zones=zones,
             object_layer=method != "a3c",
             scene_layer=hoz,
             zone_layer=hoz,

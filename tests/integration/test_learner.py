@@ -36,11 +36,11 @@ pytestmark = pytest.mark.integration
 
 def test_gradients_train_as_in_the_core_alone(free_port: int, tmp_path: Path) -> None:
     run = tmp_path / "first"
-    core = LearnerCore(CONFIG, initial_parameters(CONFIG))
+    core = LearnerCore(CONFIG, initial_parameters(CONFIG.policy, CONFIG.seed))
     with running_learner(free_port, run) as endpoint, FakeActor(endpoint, "first") as actor:
         parameters = actor.fetch()
         assert parameters.head.stamp == (1, 0)
-        np.testing.assert_array_equal(parameters.vector, initial_parameters(CONFIG))
+        np.testing.assert_array_equal(parameters.vector, initial_parameters(CONFIG.policy, CONFIG.seed))
         for sequence in range(5):
             values = gradient_for(parameters, sequence)
             answer = actor.gradient(sequence, parameters.head.stamp, values)

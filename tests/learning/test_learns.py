@@ -71,7 +71,7 @@ def train(config: RunConfig, updates: int) -> tuple[float, NDArray[np.float32]]:
         zones=config.zones,
     )
     collector.bank.put(merge_rooms("kitchen", [graph], version=1))
-    optimizer = FlatAdam(initial_parameters(config), config.learning_rate, config.gradient_norm)
+    optimizer = FlatAdam(initial_parameters(config.policy, config.seed), config.learning_rate, config.gradient_norm)
     ended: list[bool] = []
     for _ in range(updates):
         collector.parameters.load(optimizer.parameters)

@@ -15,9 +15,9 @@ def test_parameters_of_another_network_are_refused() -> None:
 def test_a_guided_method_needs_a_graph() -> None:
     config = RunConfig(method="hoz")
     with pytest.raises(NotFoundError, match="no scene graph"):
-        load_agent(config, initial_parameters(config), {})
+        load_agent(config, initial_parameters(config.policy, config.seed), {})
     plain = RunConfig(method="object")
-    assert load_agent(plain, initial_parameters(plain), {}).name == "object"
+    assert load_agent(plain, initial_parameters(plain.policy, plain.seed), {}).name == "object"
 
 
 def test_an_encoder_with_other_weights_is_refused() -> None:

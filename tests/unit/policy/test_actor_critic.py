@@ -22,7 +22,7 @@ def bank() -> GraphBank:
 @pytest.mark.parametrize("preset", ["compact", "paper"])
 @pytest.mark.parametrize("method", ["a3c", "object", "hoz"])
 def test_unrolling_says_what_acting_said(method: Method, preset: Preset, bank: GraphBank) -> None:
-    policy = make_policy(RunConfig(method=method, preset=preset))
+    policy = make_policy(RunConfig(method=method, preset=preset).policy, 0)
     observation = make_observation(STEPS, BATCH)
     start = state = policy.initial_state(BATCH)
     decisions = []
@@ -58,41 +58,41 @@ def unroll_once(policy: ActorCritic, bank: GraphBank) -> None:
 @pytest.mark.parametrize("method", ["a3c", "object", "hoz"])
 def test_the_gradient_reaches_every_parameter(method: Method, bank: GraphBank) -> None:
     """In the released code it does not reach lambda."""
-    policy = make_policy(RunConfig(method=method))
+    policy = make_policy(RunConfig(method=method).policy, 0)
     unroll_once(policy, bank)
     without = [name for name, p in policy.named_parameters() if p.grad is None or p.grad.abs().max() == 0.0]
     assert without == []
 
 
 def test_only_known_scenes_are_used(bank: GraphBank) -> None:
-    policy = make_policy(CONFIG)
+    policy = make_policy(CONFIG.policy, CONFIG.seed)
     decision = policy.act(make_observation(64), policy.initial_state(64), bank)
     assert set(decision.guidance.scene.tolist()) <= {0, 2}  # kitchen and bedroom
 
 
 def test_methods_differ_by_their_layers() -> None:
-    sizes = [len(initial_parameters(RunConfig(method=method))) for method in ("a3c", "object", "hoz")]
+    sizes = [len(initial_parameters(RunConfig(method=method).policy, 0)) for method in ("a3c", "object", "hoz")]
     assert sizes == sorted(set(sizes))
 
 
 def test_paper_preset_has_the_papers_size() -> None:
-    assert 9.5e6 < len(initial_parameters(RunConfig(preset="paper"))) < 9.9e6
+    assert 9.5e6 < len(initial_parameters(RunConfig(preset="paper").policy, 0)) < 9.9e6
 
 
 def test_parameters_follow_from_the_seed_alone() -> None:
-    first = initial_parameters(RunConfig(seed=3))
+    first = initial_parameters(RunConfig(seed=3).policy, 3)
     torch.manual_seed(99)
-    assert (initial_parameters(RunConfig(seed=3)) == first).all()
-    assert (initial_parameters(RunConfig(seed=4)) != first).any()
+    assert (initial_parameters(RunConfig(seed=3).policy, 3) == first).all()
+    assert (initial_parameters(RunConfig(seed=4).policy, 4) != first).any()
 
 
 def test_flat_parameters_are_the_networks_own(bank: GraphBank) -> None:
-    policy = make_policy(CONFIG)
+    policy = make_policy(CONFIG.policy, CONFIG.seed)
     flat = FlatParameters(policy)
     unroll_once(policy, bank)
     gathered = torch.cat([p.grad.flatten() for p in policy.parameters() if p.grad is not None])
     assert torch.equal(flat.gradients, gathered)
-    other = initial_parameters(RunConfig(seed=5))
+    other = initial_parameters(RunConfig(seed=5).policy, 5)
     flat.load(other)
     assert torch.equal(torch.cat([p.detach().flatten() for p in policy.parameters()]), torch.from_numpy(other))
     with pytest.raises(ValueError, match="expected"):
