@@ -1,6 +1,7 @@
 """`hoz-dist status`: asks a learner who takes part and how it goes."""
 
-from typing import TYPE_CHECKING, Any
+from collections import Counter
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
@@ -9,6 +10,9 @@ from hoz_dist.cli.options import echo_json, json_option
 
 if TYPE_CHECKING:
     from rich.table import Table
+
+_NAMED_ROOMS: Final = 3
+"""Rooms of a process that are named one by one."""
 
 
 @click.command("status")
@@ -40,9 +44,20 @@ def _headline(status: dict[str, Any]) -> str:
         parts.append(f"{frames:,} frames")
     if isinstance(rate := status.get("frames_per_second"), float | int):
         parts.append(f"{rate:,.0f} frames/s")
+    success = status.get("success")
+    if isinstance(success, dict) and isinstance(share := success.get("overall"), float | int):
+        parts.append(f"success {share:.0%}")
     if isinstance(progress := status.get("progress"), float | int):
         parts.append(f"{progress:.0%} done")
     return ", ".join(parts)
+
+
+def _rooms_text(rooms: list[str]) -> str:
+    """Name a few rooms; count many by scene."""
+    if len(rooms) <= _NAMED_ROOMS:
+        return ", ".join(rooms)
+    scenes = Counter(room.partition("/")[0] for room in rooms)
+    return ", ".join(f"{scene} ({count})" for scene, count in scenes.items())
 
 
 def _process_table(processes: list[dict[str, Any]]) -> "Table":
@@ -54,7 +69,7 @@ def _process_table(processes: list[dict[str, Any]]) -> "Table":
         table.add_row(
             process["role"],
             process["id"],
-            ", ".join(process["rooms"]),
+            _rooms_text(process["rooms"]),
             f"{process['frames']:,}",
             f"{process['frames_per_second']:,.0f}",
             f"{process['lag']:.1f}",
