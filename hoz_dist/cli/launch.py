@@ -4,13 +4,17 @@ import signal
 import tempfile
 import threading
 from collections.abc import Sequence
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any, Final
+
+import click
 
 from hoz_dist.cli.processes import Child, Children
 from hoz_dist.cli.progress import Progress
 from hoz_dist.client import HozClient
 from hoz_dist.errors import ConnectionFailedError, HozError
+from hoz_dist.wire.waiting import Deadline
 
 START_S: Final = 60.0
 """How long the learner may take to answer for the first time, seconds."""
@@ -37,7 +41,11 @@ def launch(run: Path, endpoint: str, learner: Sequence[str], actor: Sequence[str
         with tempfile.TemporaryDirectory(prefix="hoz-dist-") as logs, Children() as children:
             options = ["learner", "--listen", endpoint, "--run", str(run), "--exit-when-done", *learner]
             core = children.start("learner", options, Path(logs) / "learner")
-            with _connect(endpoint, core) as client:
+            client = _connect(endpoint, core)
+            if client is None:
+                click.echo(f"The run in {run} has used up its budget; another --run trains anew.")
+                return
+            with client:
                 for number in range(actors):
                     name = f"actor-{number}"
                     options = ["actor", "--connect", endpoint, "--name", name, *actor]
@@ -47,19 +55,23 @@ def launch(run: Path, endpoint: str, learner: Sequence[str], actor: Sequence[str
         signal.signal(signal.SIGTERM, previous)
 
 
-def _connect(endpoint: str, learner: Child) -> HozClient:
-    """Wait until the learner answers."""
-    pause = threading.Event()
-    for _ in range(int(START_S / 0.2)):
+def _connect(endpoint: str, learner: Child) -> HozClient | None:
+    """Wait until the learner serves the run; None when it ends at once, because the budget was used up before.
+
+    That it answers at its endpoint is not enough: only then does it look whether it may use the run folder.
+    """
+    deadline = Deadline(START_S)
+    while not deadline.passed:
+        if learner.status == 0:
+            return None
         if learner.status is not None:
             # It says what is wrong: a run of another configuration, a folder in use, ...
             raise HozError(learner.last_words())
-        try:
-            client = HozClient(endpoint)
-        except HozError:
-            pause.wait(0.2)
-        else:
-            return client
+        with suppress(HozError), ExitStack() as stack:
+            client = stack.enter_context(HozClient(endpoint))
+            if client.status()["progress"] != 1.0:
+                stack.pop_all()
+                return client
     message = f"The learner did not answer at {endpoint} within {START_S:g} s: {learner.last_words()}"
     raise ConnectionFailedError(message)
 
@@ -67,17 +79,21 @@ def _connect(endpoint: str, learner: Child) -> HozClient:
 def _watch(client: HozClient, learner: Child, children: Children) -> None:
     """Show the progress until the learner ends."""
     pause = threading.Event()
+    finished, summary = False, ""
     with Progress("Training", 1.0, None) as progress:
         while learner.status != 0:
-            for child in children:
+            # Actors that find no learner at the end of a run have not failed.
+            for child in [learner] if finished else children:
                 child.restart_if_killed()
             try:
                 status = client.status()
             except HozError:
                 status = None  # it is ending, or starting again
             if status is not None:
-                progress.update(status["progress"] or 0.0, _summary(status))
+                finished, summary = status["finished"], _summary(status)
+                progress.update(status["progress"] or 0.0, summary)
             pause.wait(POLL_S)
+        progress.update(1.0, summary)
 
 
 def _summary(status: dict[str, Any]) -> str:

@@ -2,6 +2,7 @@
 
 import socket
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -72,21 +73,23 @@ def train_command(
     the same command then goes on where the run was.
     """
     from hoz_dist.cli.launch import launch
-    from hoz_dist.cli.report import report
-    from hoz_dist.errors import InvalidValueError
+    from hoz_dist.config import RunConfig
     from hoz_dist.nav.rooms import training_rooms
 
-    if minutes is not None and frames is not None:
-        message = "A run's budget is either --minutes or --frames; give one of them."
-        raise InvalidValueError(message)
     rooms = training_rooms(scenes or SCENES)
     minutes = 10.0 if minutes is None and frames is None else minutes
+    choices: dict[str, Any] = {"method": model, "preset": preset, "encoder": encoder, "seed": seed}
+    RunConfig(**choices, minutes=minutes, frames=frames)  # says what is wrong before any process starts
     files = [] if weights is None else ["--weights", str(weights)]
     learner = ["--model", model, "--preset", preset, "--encoder", encoder, "--seed", str(seed), *files]
     learner += ["--minutes", str(minutes)] if frames is None else ["--frames", str(frames)]
     actor = [word for room in rooms for word in ("--scene", str(room))] + files
     actor += [] if cache is None else ["--cache", str(cache)]
+
     launch(run, f"tcp/127.0.0.1:{_free_port()}", learner, actor, actors)
+
+    from hoz_dist.cli.report import report  # only now: it takes seconds to import
+
     report(run, episodes=episodes, seed=seed, weights=weights, cache=cache)
 
 

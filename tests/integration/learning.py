@@ -193,7 +193,7 @@ def wait_for_checkpoint(run: Path, version: int) -> None:
 def status_when(client: HozClient, wanted: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
     """Ask for the status until it is as wanted."""
     pause = threading.Event()
-    for _ in range(100):
+    for _ in range(300):
         status = client.status()
         if wanted(status):
             return status
