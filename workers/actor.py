@@ -23,7 +23,8 @@ from hoz_dist.nav.rooms import RoomId
 from hoz_dist.sim.batch_env import BatchEnv
 from hoz_dist.sim.view_source import ViewSource
 from hoz_dist.sim.view_store import ViewStore
-from hoz_dist.wire.messages import Accepted, Refused
+from hoz_dist.wire.graphs import scene_graph_of
+from hoz_dist.wire.messages import Accepted, Refused, SceneGraphReply
 from hoz_dist.wire.rejection import Reason
 from hoz_dist.wire.waiting import StoppedError
 from workers.collector import Collector, Update
@@ -35,6 +36,12 @@ UPDATES_PER_ROOM: Final = 2
 """Updates between two rooms that are got ready: training begins with the first room, and soon has all."""
 REPORT_UPDATES: Final = 5
 """Updates between two reports of finished episodes."""
+_PASSING: Final = frozenset({Reason.EPOCH, Reason.STALE, Reason.INTERNAL})
+"""Reasons of refusals that the next gradient, computed on newer parameters, does not have."""
+
+
+class RunOverError(Exception):
+    """The learner takes nothing more, because the run's budget is used up; not a failure."""
 
 
 @dataclass
@@ -59,7 +66,7 @@ class Actor:
         store: The view store.
         encoder: The visual encoder, the one of the run.
         source: Where observations come from: stored views, or PyBullet at every step.
-        name: Name of the actor; with the run's seed it seeds the episodes and actions.
+        name: Name of the actor; with the run's seed and the learner's epoch it seeds the episodes and actions.
         stop: Ends the work at the next step.
     """
 
@@ -74,33 +81,43 @@ class Actor:
         stop: threading.Event,
     ) -> None:
         config = link.config
-        rng = np.random.default_rng([config.seed, zlib.crc32(name.encode())])
+        # With the epoch, a run that is resumed goes on with other episodes than it began with.
+        rng = np.random.default_rng([config.seed, zlib.crc32(name.encode()), link.epoch])
         self._link = link
         self._stop = stop
         self._preparation = RoomPreparation(rooms, store, encoder, zones=config.zones, actor=name)
         self._env = BatchEnv(config.batch, rng, source=source)
         self._collector = Collector(config, self._env, rng)
-        self._graph_versions: dict[str, tuple[int, int]] = {}
-        self._report = _Report()
+        self._epoch = link.epoch
         self._newest: tuple[int, int] | None = None
-        self._epoch: int | None = None
+        """Epoch and version that the next parameters must have reached."""
         self._room_graphs: list[RoomGraph] = []
+        self._scene_graphs: dict[str, SceneGraphReply] = {}
+        """The messages whose graphs are in use, by scene."""
+        self._report = _Report()
 
     def run(self) -> None:
-        """Work until the run is over or `stop` is set."""
+        """Work until the run is over or `stop` is set.
+
+        Raises:
+            HozError: The learner refuses what this actor makes, now serves another run, or the view store fails.
+        """
+        updates = 0
         try:
             self._prepare_room()
-            updates = 0
             while not self._stop.is_set():
                 if self._preparation.waiting and updates % UPDATES_PER_ROOM == UPDATES_PER_ROOM - 1:
                     self._prepare_room()
                 self._refresh_graphs()
-                if not self._update():
-                    _log.info("the run is over")
-                    return
+                self._update()
                 updates += 1
+                if self._report.updates == REPORT_UPDATES:
+                    self._send_report()
+            _log.info("stopped")
         except StoppedError:
             _log.info("stopped")
+        except RunOverError:
+            _log.info("the run is over")
 
     def _prepare_room(self) -> None:
         room = self._preparation.next(self._check_stop)
@@ -109,64 +126,73 @@ class Actor:
         self._env.add_room(room.views)
         _log.info("%s is ready; %d rooms to go", room.views.room, self._preparation.waiting)
 
-    def _push_room_graph(self, graph: RoomGraph) -> None:
-        reply = self._link.push_room_graph(graph)
-        if isinstance(reply, Refused) and reply.reason != Reason.FINISHED:
-            message = f"The learner refused the graph of {graph.room} ({reply.reason}): {reply.detail}."
-            raise HozError(message)
-
     def _check_stop(self, done: int, total: int) -> None:
         del done, total
         if self._stop.is_set():
             raise StoppedError
 
+    def _push_room_graph(self, graph: RoomGraph) -> None:
+        match self._link.push_room_graph(graph):
+            case Refused(Reason.FINISHED):
+                raise RunOverError
+            case Refused(reason, detail):
+                message = f"The learner refused the graph of {graph.room} ({reason}): {detail}."
+                raise HozError(message)
+
     def _refresh_graphs(self) -> None:
         """Use the scene graphs that are new."""
-        for scene, graph in self._link.scene_graphs().items():
-            stamp = (graph.version, len(graph.rooms))
-            if self._graph_versions.get(scene) != stamp:
-                self._collector.bank.put(graph)
-                self._graph_versions[scene] = stamp
+        for scene, message in self._link.scene_graphs().items():
+            if self._scene_graphs.get(scene) is message:
+                continue
+            self._scene_graphs[scene] = message
+            try:
+                self._collector.use_graph(scene_graph_of(message))
+            except (HozError, ValueError) as error:
+                _log.warning("the learner's graph of %s cannot be used: %s", scene, error)
 
-    def _update(self) -> bool:
-        """Fetch parameters, roll out, push the gradient; False when the run is over."""
+    def _update(self) -> None:
+        """Fetch parameters, roll out, push the gradient."""
         parameters = self._link.parameters(self._newest)
-        if self._epoch not in {None, parameters.head.epoch}:
-            # A restarted learner knows what its last checkpoint held; a room graph it has already is no change.
+        if parameters.head.epoch != self._epoch:
+            # A restarted learner knows what its last checkpoint held; a room graph that it has already is no change.
+            self._epoch = parameters.head.epoch
+            self._link.check_same_run()
             for graph in self._room_graphs:
                 self._push_room_graph(graph)
-        self._epoch = parameters.head.epoch
         self._collector.parameters.load(parameters.vector)
         update = self._collector.roll_out()
-        reply = self._link.push_gradient(update.gradient, update.frames, parameters.head.stamp)
-        match reply:
+        self._report.episodes += update.finished
+        if not np.isfinite(update.gradient).all():
+            _log.warning("a gradient is not finite; it is dropped")
+            return
+        match self._link.push_gradient(update.gradient, update.frames, parameters.head.stamp):
             case Accepted(epoch, version):
                 self._newest = (epoch, version)
-                return self._account(update, lag=version - 1 - parameters.head.version)
+                self._account(update, lag=version - 1 - parameters.head.version)
             case Refused(Reason.FINISHED):
-                return False
-            case Refused(reason, detail):
-                # A new epoch or too old a version: the next rollout begins with newer parameters.
+                raise RunOverError
+            case Refused(reason, detail) if reason in _PASSING:
                 _log.warning("a gradient was refused (%s): %s", reason, detail)
                 self._newest = None
-        return True
+            case Refused(reason, detail):
+                message = f"The learner refused a gradient ({reason}): {detail}."
+                raise HozError(message)
 
-    def _account(self, update: Update, lag: int) -> bool:
-        """Take an applied update into the report; False when the run is over."""
+    def _account(self, update: Update, lag: int) -> None:
+        """Take an applied update into the report."""
         report = self._report
         report.frames += update.frames
         report.updates += 1
+        # The learner may have applied others' gradients between this one and its answer.
         report.lag += max(lag, 0)
         report.losses.update(update.loss.terms())
-        report.episodes += update.finished
-        if report.updates < REPORT_UPDATES:
-            return True
-        reply = self._link.push_episodes(
+
+    def _send_report(self) -> None:
+        report, self._report = self._report, _Report()
+        self._link.push_episodes(
             report.episodes,
             frames=report.frames,
             frames_per_second=report.frames / (time.monotonic() - report.began),
             lag=report.lag / report.updates,
             losses={name: total / report.updates for name, total in report.losses.items()},
         )
-        self._report = _Report()
-        return not (isinstance(reply, Refused) and reply.reason == Reason.FINISHED)

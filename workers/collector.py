@@ -11,9 +11,11 @@ from torch import Tensor
 from hoz_dist.a3c.loss import Loss, LossWeights, a3c_loss
 from hoz_dist.a3c.rollout import Rollout
 from hoz_dist.config import RunConfig
+from hoz_dist.graph.scene_graph import SceneGraph
+from hoz_dist.nav.categories import SCENES
 from hoz_dist.nav.episode import EpisodeResult
 from hoz_dist.nav.observation import Observation
-from hoz_dist.policy.actor_critic import ActorCritic, Decision, State
+from hoz_dist.policy.actor_critic import ActorCritic, State
 from hoz_dist.policy.graph_bank import GraphBank
 from hoz_dist.policy.navigator import Guidance
 from hoz_dist.policy.parameters import FlatParameters, make_policy
@@ -34,9 +36,13 @@ class Update(NamedTuple):
 class Collector:
     """Owns the policy copy, the environment and the recurrent state of one actor.
 
+    Args:
+        config: Configuration of the run.
+        env: Environment of ``config.batch`` episodes, with at least one room before the first rollout.
+        rng: Source of the actions.
+
     Attributes:
         parameters: The policy's parameters; load new ones between rollouts.
-        bank: The scene graphs; put new ones between rollouts.
     """
 
     def __init__(self, config: RunConfig, env: BatchEnv, rng: np.random.Generator) -> None:
@@ -45,58 +51,61 @@ class Collector:
         self._rng = rng
         self._policy: ActorCritic = make_policy(config.policy, config.seed)
         self.parameters = FlatParameters(self._policy)
-        self.bank = GraphBank(config.zones, config.edge_cost)
+        self._bank = GraphBank(config.zones, config.edge_cost)
         self._state: State = self._policy.initial_state(config.batch)
 
+    def use_graph(self, graph: SceneGraph) -> None:
+        """Use a scene graph from the next step on.
+
+        Episodes that hold a copy of the scene's earlier graph copy this one anew: merging another room may have
+        numbered the zones otherwise.
+
+        Raises:
+            ValueError: The graph has other zones or categories.
+        """
+        self._bank.put(graph)
+        zone = self._state.zone
+        stale = zone.scene == SCENES.index(graph.scene)
+        self._state = self._state._replace(zone=zone._replace(scene=zone.scene.masked_fill(stale, -1)))
+
     def roll_out(self) -> Update:
-        """Run T steps in every episode, then go back over them once."""
-        config, start = self._config, self._state
-        views, observed, guidances, values, steps, actions = [], [], [], [], [], []
+        """Run T steps in every episode, then go back over them once.
+
+        Raises:
+            InvalidValueError: The environment has no rooms.
+        """
+        start = self._state
+        observations, decisions, actions, steps = [], [], [], []
         finished: list[EpisodeResult] = []
-        decision = self._decide()
-        for _ in range(config.rollout_steps):
-            views.append(self._env.views.copy())
-            observed.append(self._observation)
-            guidances.append(decision.guidance)
-            values.append(decision.value)
+        for _ in range(self._config.rollout_steps):
+            observation = self._env.observe()
+            decision = self._policy.act(observation, self._state, self._bank)
             chosen = sample_actions(decision.logits, self._rng)
             step = self._env.step(chosen.numpy())
+            observations.append(observation)
+            decisions.append(decision)
             actions.append(chosen)
             steps.append(step)
             finished += step.finished
             self._state = decision.state
-            decision = self._decide()
+        bootstrap = self._policy.act(self._env.observe(), self._state, self._bank).value
         rollout = Rollout(
             actions=torch.stack(actions),
             rewards=_stack(step.reward for step in steps),
             terminated=_stack(step.terminated for step in steps),
             truncated=_stack(step.truncated for step in steps),
             valid=_stack(step.valid for step in steps),
-            values=torch.stack(values),
-            bootstrap=decision.value,
+            values=torch.stack([decision.value for decision in decisions]),
+            bootstrap=bootstrap,
         )
-        loss = self._differentiate(rollout, views, observed, guidances, start)
+        observation = Observation(*map(np.stack, zip(*observations, strict=True)))
+        guidance = Guidance(*map(torch.stack, zip(*(decision.guidance for decision in decisions), strict=True)))
+        loss = self._differentiate(rollout, observation, guidance, start)
         return Update(self.parameters.gradients.numpy(), rollout.frames, loss, finished)
 
-    def _decide(self) -> Decision:
-        self._observation = self._env.observe()
-        return self._policy.act(self._observation, self._state, self.bank)
-
-    def _differentiate(
-        self,
-        rollout: Rollout,
-        views: list[NDArray[np.int64]],
-        observed: list[Observation],
-        guidances: list[Guidance],
-        start: State,
-    ) -> Loss:
+    def _differentiate(self, rollout: Rollout, observation: Observation, guidance: Guidance, start: State) -> Loss:
         config = self._config
-        observation = self._env.gather(
-            np.stack(views),
-            *(np.stack(arrays) for arrays in zip(*(o[3:] for o in observed), strict=True)),
-        )
-        guidance = Guidance(*map(torch.stack, zip(*guidances, strict=True)))
-        unrolled = self._policy.unroll(observation, start, guidance, self.bank)
+        unrolled = self._policy.unroll(observation, start, guidance, self._bank)
         weights = LossWeights(
             discount=config.discount,
             gae_lambda=config.gae_lambda,

@@ -1,30 +1,34 @@
 """An actor's side of the wire: joins a run, fetches parameters and graphs, pushes what the actor made."""
 
+import dataclasses
 import secrets
 import threading
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from types import TracebackType
-from typing import Self
+from typing import Final, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hoz_dist.config import RunConfig
+from hoz_dist.errors import ConnectionFailedError, HozError
 from hoz_dist.graph.room_graph import RoomGraph
-from hoz_dist.graph.scene_graph import SceneGraph
 from hoz_dist.nav.categories import TARGETS
 from hoz_dist.nav.episode import EpisodeResult
 from hoz_dist.nav.rooms import RoomId
+from hoz_dist.wire.ask import ask
+from hoz_dist.wire.codec import decode
 from hoz_dist.wire.discovery import find_run
-from hoz_dist.wire.graphs import scene_graph_of
 from hoz_dist.wire.keys import Keys
 from hoz_dist.wire.liveliness import Member, declare_alive
 from hoz_dist.wire.messages import (
+    MAX_EPISODES,
     Accepted,
     EpisodesPush,
     GradientPush,
+    ParametersHead,
     Push,
     Refused,
     RoomGraphPush,
@@ -35,10 +39,14 @@ from hoz_dist.wire.publishing import NewestSubscriber
 from hoz_dist.wire.push import Pusher
 from hoz_dist.wire.session import Session
 
-GRAPH_S = 10.0
+JOIN_S: Final = 30.0
+"""How long to look for the run: its learner may be starting again."""
+GRAPH_S: Final = 10.0
 """How long a scene graph may take to arrive after the learner has accepted one of its rooms, seconds."""
-MAX_EPISODES = 4096
-"""Finished episodes of one push; the wire's limit."""
+GRAPH_TRIES: Final = 3
+"""How often a room graph is pushed if no scene graph comes."""
+FETCH_S: Final = 10.0
+"""How long to wait for parameters before looking whether the run is still the same, seconds."""
 
 
 class LearnerLink:
@@ -52,30 +60,40 @@ class LearnerLink:
         run: Name of the run; the only one that is found, when None.
         stop: Ends whatever waits, with `StoppedError`.
 
+    Attributes:
+        config: Configuration of the run.
+        run: Name of the run.
+        epoch: Epoch of the learner at joining.
+
     Raises:
         HozError: No run is found, or several without a name.
     """
 
     def __init__(self, session: Session, actor: str, run: str | None, stop: threading.Event) -> None:
-        reply = find_run(session, run)
+        reply = find_run(session, run, JOIN_S)
         self.config = RunConfig.from_json(reply.config)
         self.run = reply.run
+        self.epoch = reply.epoch
+        self._session = session
         self._actor = actor
         self._keys = Keys(reply.run)
+        self._stamp = (0, 0)
+        """Epoch and version of the newest parameters that were fetched."""
         self._incarnation = secrets.randbits(48)
         self._sequences: Counter[type[Push]] = Counter()
         self._pusher = Pusher(session, stop)
-        self._open = ExitStack()
-        self._open.enter_context(declare_alive(session, self._keys, Member("actor", actor)))
-        self._parameters = self._open.enter_context(ParametersFollower(session, self._keys, stop))
-        self._graphs = self._open.enter_context(
-            NewestSubscriber(
-                session,
-                self._keys.graph("*"),
-                SceneGraphReply,
-                replaces=lambda known, new: (new.version, len(new.rooms)) != (known.version, len(known.rooms)),
+        with ExitStack() as stack:
+            stack.enter_context(declare_alive(session, self._keys, Member("actor", actor)))
+            self._parameters = stack.enter_context(ParametersFollower(session, self._keys, stop))
+            self._graphs = stack.enter_context(
+                NewestSubscriber(
+                    session,
+                    self._keys.graph("*"),
+                    SceneGraphReply,
+                    replaces=lambda known, new: (new.version, new.rooms) != (known.version, known.rooms),
+                )
             )
-        )
+            self._open = stack.pop_all()
 
     def __enter__(self) -> Self:
         return self
@@ -86,16 +104,48 @@ class LearnerLink:
         self._open.close()
 
     def parameters(self, at_least: tuple[int, int] | None = None) -> Parameters:
-        """Fetch the newest parameters.
+        """Fetch the newest parameters, however long the learner is away.
 
         Args:
             at_least: Epoch and version that they must have reached.
-        """
-        return self._parameters.fetch(at_least)
 
-    def scene_graphs(self) -> dict[str, SceneGraph]:
-        """Return the newest scene graphs that were heard of, by scene."""
-        return {graph.scene: scene_graph_of(graph) for graph in self._graphs.newest.values()}
+        Raises:
+            HozError: The learner serves another run by now.
+            StoppedError: The stop event was set.
+        """
+        while True:
+            try:
+                fetched = self._parameters.fetch(at_least, FETCH_S)
+                self._stamp = fetched.head.stamp
+            except ConnectionFailedError:
+                self.check_same_run()
+            else:
+                return fetched
+
+    def check_same_run(self) -> None:
+        """Look whether the learner still serves the run that this actor joined; nobody there is no failure.
+
+        Raises:
+            HozError: It serves another configuration, or has begun anew.
+        """
+        try:
+            config = RunConfig.from_json(find_run(self._session, self.run).config)
+            heads = [
+                decode(answer.payload, ParametersHead)
+                for answer in ask(self._session, self._keys.params, timeout_s=FETCH_S)
+            ]
+        except HozError:
+            return
+        what = config.differences(self.config)
+        # Within a run, parameters never go back: these are of a new run in a new folder of the same name.
+        what += [f"version {head.version} of epoch {head.epoch}" for head in heads if head.stamp < self._stamp]
+        if what:
+            message = f"The learner of '{self.run}' has begun another run ({'; '.join(what)}); start this actor again."
+            raise HozError(message)
+
+    def scene_graphs(self) -> Mapping[str, SceneGraphReply]:
+        """Return the newest scene graphs that were heard of, by scene; one that did not change is the same object."""
+        return {graph.scene: graph for graph in self._graphs.newest.values()}
 
     def push_gradient(
         self, gradient: NDArray[np.float32], frames: int, computed_on: tuple[int, int]
@@ -150,7 +200,11 @@ class LearnerLink:
         return self._pusher.push(self._keys.rollouts(self._actor), push)
 
     def push_room_graph(self, graph: RoomGraph) -> Accepted | Refused:
-        """Push a room graph; after this, `scene_graphs` holds a scene graph that has the room."""
+        """Push a room graph; after it is accepted, `scene_graphs` holds a scene graph that has the room.
+
+        Raises:
+            ConnectionFailedError: The learner accepts the room graph, but no scene graph comes.
+        """
         room = RoomId.parse(graph.room)
         push = RoomGraphPush(
             actor=self._actor,
@@ -162,11 +216,17 @@ class LearnerLink:
             nodes=graph.nodes,
             edges=graph.edges,
         )
-        reply = self._pusher.push(self._keys.room(room), push)
-        if isinstance(reply, Accepted):
-            key = self._keys.graph(room.scene)
-            self._graphs.wait_for(lambda newest: key in newest and room in newest[key].rooms, GRAPH_S)
-        return reply
+        key = self._keys.graph(room.scene)
+        for _ in range(GRAPH_TRIES):
+            reply = self._pusher.push(self._keys.room(room), push)
+            if isinstance(reply, Refused):
+                return reply
+            if self._graphs.wait_for(lambda newest: key in newest and room in newest[key].rooms, GRAPH_S):
+                return reply
+            # A learner that was killed right after its answer has forgotten the room: tell it again.
+            push = dataclasses.replace(push, sequence=self._next(RoomGraphPush))
+        message = f"The learner accepted the graph of {room}, but its scene graph does not arrive; look at its log."
+        raise ConnectionFailedError(message)
 
     def _next(self, kind: type[Push]) -> int:
         self._sequences[kind] += 1

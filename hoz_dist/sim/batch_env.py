@@ -63,7 +63,7 @@ class BatchEnv:
 
     @property
     def views(self) -> NDArray[np.int64]:
-        """View of each slot over all rooms, [B]; copy it to keep it for `gather`."""
+        """View of each slot over all rooms, [B]; changes with the next step."""
         return self._episodes.views
 
     def add_room(self, views: RoomViews) -> None:
@@ -101,25 +101,6 @@ class BatchEnv:
         self._waiting = outcome.terminated | outcome.truncated
         finished = [self._episodes.result(slot, outcome) for slot in np.flatnonzero(self._waiting).tolist()]
         return Step(*outcome, valid, finished)
-
-    def gather(
-        self,
-        views: NDArray[np.int64],
-        target: NDArray[np.int64],
-        previous_action: NDArray[np.int64],
-        scene: NDArray[np.int64],
-        first: NDArray[np.bool_],
-    ) -> Observation:
-        """Make the observations of a whole rollout again in one look-up.
-
-        Args:
-            views: The values of `views` at each step, [T, B].
-            target: As observed at each step, [T, B].
-            previous_action: As observed at each step, [T, B].
-            scene: As observed at each step, [T, B].
-            first: As observed at each step, [T, B].
-        """
-        return self._episodes.gather(views, target, previous_action, scene, first)
 
     def _ensure_started(self) -> None:
         if self._started:

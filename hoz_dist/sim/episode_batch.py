@@ -86,25 +86,6 @@ class EpisodeBatch:
             first=self._actions == 0,
         )
 
-    def gather(
-        self,
-        views: NDArray[np.int64],
-        target: NDArray[np.int64],
-        previous_action: NDArray[np.int64],
-        scene: NDArray[np.int64],
-        first: NDArray[np.bool_],
-    ) -> Observation:
-        """Make the observations of a whole rollout again in one look-up.
-
-        Args:
-            views: The values of `views` at each step, [T, B].
-            target: [T, B].
-            previous_action: [T, B].
-            scene: [T, B].
-            first: [T, B].
-        """
-        return Observation(*self._source.recall(views), target, previous_action, scene, first)
-
     def act(self, actions: NDArray[np.int64], active: NDArray[np.bool_]) -> Outcome:
         """Take one action in each active slot; the others stay as they are.
 

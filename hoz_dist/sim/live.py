@@ -1,9 +1,8 @@
 """Observations rendered by PyBullet at every step: the check that stored views tell the truth."""
 
-from collections import OrderedDict
 from collections.abc import Callable
 from types import TracebackType
-from typing import Final, NamedTuple, Self
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,9 +17,6 @@ from hoz_dist.sim.pose_graph import PoseGraph
 from hoz_dist.sim.room import Room
 from hoz_dist.sim.room_views import RoomViews
 from hoz_dist.sim.view_source import Sight
-
-REMEMBERED_VIEWS: Final = 8192
-"""How many of the latest views `recall` can give without rendering: a rollout of 64 steps of 128 episodes."""
 
 
 class _LiveRoom(NamedTuple):
@@ -60,7 +56,7 @@ class LiveViews:
         self._load_room = rooms
         self._rooms: list[_LiveRoom] = []
         self._views = 0
-        self._seen: OrderedDict[int, _Seen] = OrderedDict()
+        self._seen: dict[int, _Seen] = {}
 
     def __enter__(self) -> Self:
         """Return the source itself."""
@@ -87,40 +83,7 @@ class LiveViews:
 
     def look(self, views: NDArray[np.int64]) -> Sight:
         """Render views [...]."""
-        for view in views.ravel().tolist():
-            self._render(view)
-        while len(self._seen) > max(REMEMBERED_VIEWS, views.size):
-            self._seen.popitem(last=False)
-        return self._sight(views)
-
-    def recall(self, views: NDArray[np.int64]) -> Sight:
-        """Show views [...] again as they were last rendered; those that are forgotten are rendered again."""
-        for view in np.unique(views).tolist():
-            if view not in self._seen:
-                self._render(view)
-        return self._sight(views)
-
-    def succeeds(self, views: NDArray[np.int64], targets: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """Tell from the last pictures of views [M] whether Done succeeds with targets [M]."""
-        for view in views.tolist():
-            if view not in self._seen:
-                self._render(view)
-        pairs = zip(views.tolist(), targets.tolist(), strict=True)
-        return np.array([self._seen[view].success[target] for view, target in pairs], dtype=np.bool_)
-
-    def _render(self, view: int) -> None:
-        """Render one view and remember what it shows, as the latest."""
-        room = next(room for room in reversed(self._rooms) if room.first_view <= view)
-        local = np.array([view - room.first_view])
-        frames = room.painter.paint(room.graph, local.tolist())
-        features = self._encoder.encode(frames.rgb, frames.depth.astype(np.float32))
-        found = room.detector.detect(frames.segmentation, room.graph.places(local))
-        looks = appearance(features, found.detections)
-        self._seen[view] = _Seen(features[0], found.detections[0], looks[0], found.success[0])
-        self._seen.move_to_end(view)
-
-    def _sight(self, views: NDArray[np.int64]) -> Sight:
-        """Gather what was seen at views [...]."""
+        self._seen = {view: self._render(view) for view in views.ravel().tolist()}
         seen = [self._seen[view] for view in views.ravel().tolist()]
 
         def gather(field: int) -> NDArray[np.float32]:
@@ -128,3 +91,18 @@ class LiveViews:
             return rows.reshape(*views.shape, *rows.shape[1:])
 
         return Sight(gather(0), gather(1), gather(2))
+
+    def succeeds(self, views: NDArray[np.int64], targets: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Tell from the pictures of views [M], which were looked at last, whether Done succeeds with targets [M]."""
+        seen = [self._seen.get(view) or self._render(view) for view in views.tolist()]
+        return np.array([entry.success[target] for entry, target in zip(seen, targets, strict=True)], dtype=np.bool_)
+
+    def _render(self, view: int) -> _Seen:
+        """Render one view and tell what it shows."""
+        room = next(room for room in reversed(self._rooms) if room.first_view <= view)
+        local = np.array([view - room.first_view])
+        frames = room.painter.paint(room.graph, local.tolist())
+        features = self._encoder.encode(frames.rgb, frames.depth.astype(np.float32))
+        found = room.detector.detect(frames.segmentation, room.graph.places(local))
+        looks = appearance(features, found.detections)
+        return _Seen(features[0], found.detections[0], looks[0], found.success[0])

@@ -31,10 +31,6 @@ class ViewSource(Protocol):
         """Show what the agent sees at views [...] now."""
         ...
 
-    def recall(self, views: NDArray[np.int64]) -> Sight:
-        """Show again what was seen at views [...] of a whole rollout."""
-        ...
-
     def succeeds(self, views: NDArray[np.int64], targets: NDArray[np.int64]) -> NDArray[np.bool_]:
         """Tell whether Done succeeds at views [M], which were looked at last, with targets [M]."""
         ...
@@ -64,10 +60,6 @@ class StoredViews:
             detections=self._detections.take(views),
             appearance=self._appearance.take(views).astype(np.float32),
         )
-
-    def recall(self, views: NDArray[np.int64]) -> Sight:
-        """Look views [...] up again."""
-        return self.look(views)
 
     def succeeds(self, views: NDArray[np.int64], targets: NDArray[np.int64]) -> NDArray[np.bool_]:
         """Look up whether Done succeeds at views [M] with targets [M]."""

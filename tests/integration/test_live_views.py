@@ -28,13 +28,11 @@ def test_stored_and_live_episodes_are_the_same(cache: Path) -> None:
             stored.add_room(views)
             live.add_room(views)
         rng = np.random.default_rng(4)
-        visited, observed, successes, ended = [], [], 0, 0
+        successes, ended = 0, 0
         for _ in range(60):
             expected, actual = stored.observe(), live.observe()
             for name, array in actual._asdict().items():
                 assert np.array_equal(array, expected._asdict()[name]), name
-            visited.append(stored.views.copy())
-            observed.append(expected)
             actions = rng.choice(6, size=batch, p=[0.3, 0.2, 0.15, 0.1, 0.1, 0.15])
             # Nobody succeeds often by chance: say Done wherever the store says that it would succeed.
             numbers = (stored.views >= rooms[0].graph.views).astype(int)
@@ -49,6 +47,3 @@ def test_stored_and_live_episodes_are_the_same(cache: Path) -> None:
             successes += sum(result.success for result in step.finished)
             ended += len(step.finished)
         assert 0 < successes < ended
-        parts = [np.stack(parts) for parts in zip(*observed, strict=True)]
-        for part, again in zip(parts, live.gather(np.stack(visited), *parts[3:]), strict=True):
-            assert np.array_equal(part, again)

@@ -70,7 +70,7 @@ def train(config: RunConfig, updates: int) -> tuple[float, NDArray[np.float32]]:
         bags=views.bag,
         zones=config.zones,
     )
-    collector.bank.put(merge_rooms("kitchen", [graph], version=1))
+    collector.use_graph(merge_rooms("kitchen", [graph], version=1))
     optimizer = FlatAdam(initial_parameters(config.policy, config.seed), config.learning_rate, config.gradient_norm)
     ended: list[bool] = []
     for _ in range(updates):

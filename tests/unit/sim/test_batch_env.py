@@ -159,20 +159,6 @@ def test_without_rooms_nothing_can_be_observed() -> None:
         env.step(all_of(Action.DONE, 2))
 
 
-def test_a_rollout_is_gathered_as_it_was_observed() -> None:
-    env = make(4, max_actions=5)
-    rng = np.random.default_rng(3)
-    observed, views = [], []
-    for _ in range(12):
-        observed.append(env.observe())
-        views.append(env.views.copy())
-        env.step(rng.integers(6, size=4))
-    stacked = [np.stack(parts) for parts in zip(*observed, strict=True)]
-    gathered = env.gather(np.stack(views), *stacked[3:])
-    for expected, actual in zip(stacked, gathered, strict=True):
-        assert np.array_equal(expected, actual)
-
-
 def test_the_seed_decides_everything() -> None:
     def run(seed: int) -> list[NDArray[np.int64]]:
         env, rng = make(6, seed, max_actions=7), np.random.default_rng(0)
