@@ -117,11 +117,16 @@ def load_checkpoint(path: Path) -> Checkpoint:
     if not files:
         message = f"There is no checkpoint in '{path}'; give a checkpoint file or the folder of a run that saved one."
         raise NotFoundError(message)
+    failures: list[HozError] = []
     for file in files:
         try:
-            return _load_file(file)
+            checkpoint = _load_file(file)
         except HozError as error:
-            _log.warning("%s", error)
+            failures.append(error)
+        else:
+            for failure in failures:
+                _log.warning("%s", failure)
+            return checkpoint
     message = f"None of the {len(files)} checkpoints in '{folder}' can be read; the newest is '{files[0].name}'."
     raise DamagedFileError(message)
 
