@@ -91,7 +91,8 @@ def _watch(client: HozClient, learner: Child, children: Children) -> None:
                 status = None  # it is ending, or starting again
             if status is not None:
                 finished, summary = status["finished"], _summary(status)
-                progress.update(status["progress"] or 0.0, summary)
+                # A run that goes on has begun before this process.
+                progress.update(status["progress"] or 0.0, summary, left=status["seconds_left"])
             pause.wait(POLL_S)
         progress.update(1.0, summary)
 

@@ -23,7 +23,9 @@ def duration(seconds: float) -> str:
     return f"{whole // _HOUR_S} h {whole % _HOUR_S // _MINUTE_S:02} min"
 
 
-def progress_text(done: float, total: float, elapsed: float, unit: str | None, note: str = "") -> str:
+def progress_text(
+    done: float, total: float, elapsed: float, unit: str | None, note: str = "", left: float | None = None
+) -> str:
     """Say how far some work is.
 
     Args:
@@ -33,6 +35,7 @@ def progress_text(done: float, total: float, elapsed: float, unit: str | None, n
         unit: What is counted, for example ``"views"``; None leaves out the count and the speed, for work that ends
             after a certain time.
         note: What else is worth saying.
+        left: Seconds that are left; None for an estimate from the speed since the start.
 
     Returns:
         For example ``50%  1,200/2,400 views  240 views/s  kitchen/3  5 s left``.
@@ -47,6 +50,8 @@ def progress_text(done: float, total: float, elapsed: float, unit: str | None, n
         parts.append(note)
     if share >= 1.0:
         parts.append(f"took {duration(elapsed)}")
+    elif left is not None:
+        parts.append(f"{duration(left)} left")
     elif share > 0 and elapsed > 0:
         parts.append(f"{duration(elapsed * (1 - share) / share)} left")
     return "  ".join(parts)
@@ -113,17 +118,18 @@ class Progress:
         elif self._last:
             self._print()
 
-    def update(self, done: float, note: str = "", *, total: float | None = None) -> None:
+    def update(self, done: float, note: str = "", *, total: float | None = None, left: float | None = None) -> None:
         """Tell how much is done.
 
         Args:
             done: How much is done since the start, in units.
             note: What else is worth saying, shown as it is.
             total: How much there is to do, if that is known better by now.
+            left: Seconds that are left, if somebody knows better than the speed since the start tells.
         """
         now = self._clock()
         self._total = self._total if total is None else total
-        self._last = progress_text(done, self._total, now - self._start, self._unit, note)
+        self._last = progress_text(done, self._total, now - self._start, self._unit, note, left)
         if self._bar is not None:
             self._bar.update(self._task, completed=done, total=self._total, text=self._last)
         elif now - self._printed >= self._every:

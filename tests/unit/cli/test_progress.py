@@ -34,6 +34,11 @@ def test_text_says_count_speed_and_time_left() -> None:
     assert text == " 50%  1,200/2,400 views  240 views/s  kitchen/3  5 s left"
 
 
+def test_text_takes_the_time_left_from_who_knows_it() -> None:
+    # Work that goes on where it was: the time since this start tells nothing about the speed.
+    assert progress_text(0.5, 1.0, 2.0, None, left=240.0) == " 50%  4 min 00 s left"
+
+
 def test_text_of_a_time_budget_leaves_out_the_count() -> None:
     assert progress_text(60, 480, 60, None, "900 frames/s") == " 12%  900 frames/s  7 min 00 s left"
 
