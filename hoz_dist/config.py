@@ -6,7 +6,7 @@ from typing import Any, Final, get_args
 from hoz_dist.errors import InvalidValueError, UnknownNameError
 from hoz_dist.graph.planner import EdgeCost
 from hoz_dist.nav.pose import PICTURE_SIZE
-from hoz_dist.policy.settings import EncoderName, Method, PolicySettings, Preset
+from hoz_dist.policy.settings import EncoderName, Layer, Method, PolicySettings, Preset
 
 PRESET_LEARNING_RATES: Final[dict[Preset, float]] = {"compact": 1e-3, "paper": 1e-4}
 """Adam's learning rate at the start; the paper's is 1e-4."""
@@ -22,6 +22,8 @@ class RunConfig:
     """
 
     method: Method = "hoz"
+    without: tuple[Layer, ...] = ()
+    """Layers of the method that are switched off."""
     preset: Preset = "compact"
     encoder: EncoderName = "pooled"
     encoder_key: str = "pooled-1-g7"
@@ -62,6 +64,7 @@ class RunConfig:
             ("preset", self.preset, get_args(Preset)),
             ("encoder", self.encoder, get_args(EncoderName)),
             ("edge cost", self.edge_cost, get_args(EdgeCost)),
+            *(("layer", layer, get_args(Layer)) for layer in self.without),
         ):
             if value not in known:
                 raise UnknownNameError.of(name, str(value), known)
@@ -77,11 +80,13 @@ class RunConfig:
     @property
     def policy(self) -> PolicySettings:
         """The settings of the policy network."""
-        return PolicySettings.of(self.method, self.preset, channels=self.channels, zones=self.zones)
+        return PolicySettings.of(
+            self.method, self.preset, channels=self.channels, zones=self.zones, without=self.without
+        )
 
     def to_json(self) -> dict[str, Any]:
         """Return the configuration as JSON values."""
-        return asdict(self)
+        return asdict(self) | {"without": list(self.without)}
 
     @classmethod
     def from_json(cls, values: object) -> "RunConfig":
@@ -103,22 +108,27 @@ class RunConfig:
             )
             raise InvalidValueError(message)
         for name, value in values.items():
-            default = known[name].default
-            optional = name in {"minutes", "frames"}
-            expected = (
-                (float, int)
-                if isinstance(default, float) or name == "minutes"
-                else (int if optional else type(default))
-            )
-            if isinstance(value, bool) or not (isinstance(value, expected) or (optional and value is None)):
+            if not _fits(name, value, known[name].default):
                 message = f"'{name}' of the configuration is {value!r}, which is of the wrong type."
                 raise InvalidValueError(message)
-        return cls(**values)
+        return cls(**(values | {"without": tuple(values["without"])}))
 
     def differences(self, other: "RunConfig") -> list[str]:
         """Name the fields in which two configurations differ, each as ``name: mine, other's``."""
         mine, theirs = self.to_json(), other.to_json()
         return [f"{name}: {mine[name]!r}, {theirs[name]!r}" for name in mine if mine[name] != theirs[name]]
+
+
+def _fits(name: str, value: object, default: object) -> bool:
+    """Tell whether a JSON value is of a field's type, which its default shows."""
+    match name:
+        case "minutes":
+            return value is None or type(value) in {int, float}
+        case "frames":
+            return value is None or type(value) is int
+        case "without":
+            return isinstance(value, list) and all(type(layer) is str for layer in value)
+    return type(value) is type(default) or (type(default) is float and type(value) is int)
 
 
 _RANGES: Final = (
@@ -127,7 +137,8 @@ _RANGES: Final = (
     ("zones", 2, 64),
     ("seed", 0, 2**31 - 1),
     ("batch", 1, 4096),
-    ("rollout_steps", 1, 1000),
+    # After an episode's end comes a step that only resets, so of two steps one is valid.
+    ("rollout_steps", 2, 1000),
     ("discount", 0.0, 1.0),
     ("gae_lambda", 0.0, 1.0),
     ("entropy_weight", 0.0, 10.0),

@@ -27,6 +27,11 @@ from hoz_dist.config import PRESET_LEARNING_RATES, RunConfig
 @click.option(
     "--model", "method", default=RunConfig.method, show_default=True, help="What guides the agent: a3c, object or hoz."
 )
+@click.option(
+    "--without",
+    multiple=True,
+    help="Layer of the model to switch off: object, scene, zone or done (the done reminder); may be repeated.",
+)
 @click.option("--preset", default=RunConfig.preset, show_default=True, help="Sizes of the network: compact or paper.")
 @click.option("--encoder", default=RunConfig.encoder, show_default=True, help="Visual encoder: pooled or resnet18.")
 @click.option(

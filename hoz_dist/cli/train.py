@@ -31,6 +31,11 @@ from hoz_dist.nav.categories import SCENES
     show_default=True,
     help="Method: a3c, object (a3c and the object layer) or hoz (object and scene, zones, done reminder).",
 )
+@click.option(
+    "--without",
+    multiple=True,
+    help="Layer of the model to switch off: object, scene, zone or done (the done reminder); may be repeated.",
+)
 @click.option("--preset", default="compact", show_default=True, help="Sizes of the network: compact or paper.")
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of parameters and episodes.")
 @click.option(
@@ -59,6 +64,7 @@ def train_command(
     frames: int | None,
     actors: int,
     model: str,
+    without: tuple[str, ...],
     preset: str,
     seed: int,
     scenes: tuple[str, ...],
@@ -76,14 +82,15 @@ def train_command(
     from hoz_dist.config import RunConfig
     from hoz_dist.nav.rooms import training_rooms
 
-    rooms = training_rooms(scenes or SCENES)
+    training_rooms(scenes or SCENES)  # what is wrong with them is said before anything starts
     minutes = 10.0 if minutes is None and frames is None else minutes
     choices: dict[str, Any] = {"method": model, "preset": preset, "encoder": encoder, "seed": seed}
     RunConfig(**choices, minutes=minutes, frames=frames)  # says what is wrong before any process starts
     files = [] if weights is None else ["--weights", str(weights)]
     learner = ["--model", model, "--preset", preset, "--encoder", encoder, "--seed", str(seed), *files]
+    learner += [word for layer in without for word in ("--without", layer)]
     learner += ["--minutes", str(minutes)] if frames is None else ["--frames", str(frames)]
-    actor = [word for room in rooms for word in ("--scene", str(room))] + files
+    actor = [word for place in scenes or SCENES for word in ("--scene", place)] + files
     actor += [] if cache is None else ["--cache", str(cache)]
 
     launch(run, f"tcp/127.0.0.1:{_free_port()}", learner, actor, actors)

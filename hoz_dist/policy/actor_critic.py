@@ -141,7 +141,8 @@ class ActorCritic(nn.Module):
         zone, guidance = state.zone, Guidance.nothing(len(first))
         embedding = None
         if self.zone_layer is not None:
-            zone, guidance = guide(self.zone_layer, bank, zone, inputs.bag, inputs.target, scene_logits, first)
+            scene = torch.from_numpy(observation.scene)
+            zone, guidance = guide(self.zone_layer, bank, zone, inputs.bag, inputs.target, scene_logits, scene, first)
             embedding = self.zone_layer(zone.nodes, bank.adjacency[guidance.scene, guidance.subgoal])
         joined = self._join(inputs, picture, scene_logits, embedding)
         outputs, lstm = self.lstm(joined.unsqueeze(0), first.unsqueeze(0), state.lstm)

@@ -60,7 +60,8 @@ class ZoneLayer(nn.Module):
     @property
     def update_rate(self) -> Tensor:
         """Lambda of Eq. 4, a scalar in (0, 1)."""
-        return torch.sigmoid(self.rate)
+        # Without the bounds, float32 rounds the sigmoid of a large number to 1.
+        return torch.sigmoid(self.rate).clamp(1e-4, 1.0 - 1e-4)
 
     def update(self, nodes: Tensor, bag: Tensor, current: Tensor) -> Tensor:
         """Move the current zone's node towards the view, delta_t of Eq. 4.

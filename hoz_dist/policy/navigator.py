@@ -75,6 +75,7 @@ def guide(
     bag: Tensor,
     target: Tensor,
     scene_logits: Tensor | None,
+    true_scene: Tensor,
     first: Tensor,
 ) -> tuple[ZoneState, Guidance]:
     """Look, find the current zone, update the local graph, and plan.
@@ -88,16 +89,18 @@ def guide(
         state: State after the step before.
         bag: f_t, [B, N].
         target: One-hot target indicator, [B, N].
-        scene_logits: Logits of the scene layer, [B, S]; None when it is switched off: then the first known graph is
-            used.
+        scene_logits: Logits of the scene layer, [B, S]; None when it is switched off.
+        true_scene: Scene of the room, [B]; used only without the scene layer, as in the released code.
         first: Whether the episode begins, [B].
 
     Returns:
         The state after the step and the decisions taken.
     """
-    evidence = torch.where(first.unsqueeze(1), torch.zeros(()), state.evidence)
-    if scene_logits is not None:
-        evidence = evidence + functional.log_softmax(scene_logits, dim=-1)
+    if scene_logits is None:
+        evidence = functional.one_hot(true_scene, len(SCENES)).float()
+    else:
+        remembered = torch.where(first.unsqueeze(1), torch.zeros(()), state.evidence)
+        evidence = remembered + functional.log_softmax(scene_logits, dim=-1)
     scene = evidence.masked_fill(~bank.available, -torch.inf).argmax(dim=1)
     fresh = first | (scene != state.scene)
     nodes = torch.where(fresh[:, None, None], bank.nodes[scene], state.nodes)

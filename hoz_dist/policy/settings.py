@@ -6,6 +6,8 @@ from typing import Final, Literal
 Method = Literal["a3c", "object", "hoz"]
 Preset = Literal["compact", "paper"]
 EncoderName = Literal["pooled", "resnet18"]
+Layer = Literal["object", "scene", "zone", "done"]
+"""Layers that can be switched off: object, scene and zone layer, done reminder."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,6 +38,14 @@ PRESETS: Final[dict[Preset, Sizes]] = {
 }
 
 
+METHOD_LAYERS: Final[dict[Method, tuple[Layer, ...]]] = {
+    "a3c": (),
+    "object": ("object",),
+    "hoz": ("object", "scene", "zone", "done"),
+}
+"""The layers of each method, besides picture, target indicator and previous action."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class PolicySettings:
     """Everything that shapes the network; two networks of equal settings have equal parameter vectors."""
@@ -53,15 +63,17 @@ class PolicySettings:
     """K of the scene graphs."""
 
     @classmethod
-    def of(cls, method: Method, preset: Preset, *, channels: int, zones: int) -> "PolicySettings":
-        """Return the settings of a method: ``a3c`` < ``object`` < ``hoz``, each with more layers."""
-        hoz = method == "hoz"
+    def of(
+        cls, method: Method, preset: Preset, *, channels: int, zones: int, without: tuple[Layer, ...] = ()
+    ) -> "PolicySettings":
+        """Return the settings of a method, less some of its layers."""
+        layers = set(METHOD_LAYERS[method]) - set(without)
         return cls(
             sizes=PRESETS[preset],
             channels=channels,
             zones=zones,
-            object_layer=method != "a3c",
-            scene_layer=hoz,
-            zone_layer=hoz,
-            done_reminder=hoz,
+            object_layer="object" in layers,
+            scene_layer="scene" in layers,
+            zone_layer="zone" in layers,
+            done_reminder="done" in layers,
         )

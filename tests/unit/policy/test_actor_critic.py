@@ -1,12 +1,16 @@
+from itertools import combinations
+from typing import get_args
+
 import pytest
 import torch
 
 from hoz_dist.config import RunConfig
-from hoz_dist.policy.actor_critic import ActorCritic
+from hoz_dist.nav.observation import Observation
+from hoz_dist.policy.actor_critic import ActorCritic, Decision, State
 from hoz_dist.policy.graph_bank import GraphBank
 from hoz_dist.policy.navigator import Guidance
 from hoz_dist.policy.parameters import FlatParameters, initial_parameters, make_policy
-from hoz_dist.policy.settings import Method, Preset
+from hoz_dist.policy.settings import Layer, Method, Preset
 from tests.unit.policy.making import make_observation, make_scene_graph, step_of
 
 STEPS, BATCH = 9, 4
@@ -19,34 +23,53 @@ def bank() -> GraphBank:
     return GraphBank.of(graphs, CONFIG.zones, CONFIG.edge_cost)
 
 
-@pytest.mark.parametrize("preset", ["compact", "paper"])
-@pytest.mark.parametrize("method", ["a3c", "object", "hoz"])
-def test_unrolling_says_what_acting_said(method: Method, preset: Preset, bank: GraphBank) -> None:
-    policy = make_policy(RunConfig(method=method, preset=preset).policy, 0)
-    observation = make_observation(STEPS, BATCH)
-    start = state = policy.initial_state(BATCH)
+def act_over(policy: ActorCritic, observation: Observation, state: State, bank: GraphBank) -> list[Decision]:
+    """Act step by step."""
     decisions = []
-    for t in range(STEPS):
-        decision = policy.act(step_of(observation, t), state, bank)
-        state = decision.state
-        decisions.append(decision)
+    for t in range(len(observation.target)):
+        decisions.append(policy.act(step_of(observation, t), state, bank))
+        state = decisions[-1].state
+    return decisions
+
+
+LAYERS = get_args(Layer)
+
+
+@pytest.mark.parametrize("preset", ["compact", "paper"])
+@pytest.mark.parametrize("without", [combination for n in range(5) for combination in combinations(LAYERS, n)])
+def test_unrolling_says_what_acting_said(without: tuple[Layer, ...], preset: Preset, bank: GraphBank) -> None:
+    """With every combination of layers, from a state in the middle of episodes."""
+    policy = make_policy(RunConfig(without=without, preset=preset).policy, 0)
+    before, observation = make_observation(3, BATCH, seed=1), make_observation(STEPS, BATCH)
+    observation.first[0] = False
+    start = act_over(policy, before, policy.initial_state(BATCH), bank)[-1].state
+    decisions = act_over(policy, observation, start, bank)
     guidance = Guidance(*map(torch.stack, zip(*(decision.guidance for decision in decisions), strict=True)))
     with torch.no_grad():
         unrolled = policy.unroll(observation, start, guidance, bank)
     torch.testing.assert_close(unrolled.logits, torch.stack([d.logits for d in decisions]), atol=1e-5, rtol=1e-4)
     torch.testing.assert_close(unrolled.values, torch.stack([d.value for d in decisions]), atol=1e-5, rtol=1e-4)
-    assert (unrolled.scene_logits is not None) == (method == "hoz")
+    assert (unrolled.scene_logits is not None) == ("scene" not in without)
+
+
+def test_the_state_before_a_rollout_matters(bank: GraphBank) -> None:
+    policy = make_policy(CONFIG.policy, 0)
+    observation = make_observation(1, BATCH)
+    observation.first[0] = False
+    start = act_over(policy, make_observation(3, BATCH, seed=1), policy.initial_state(BATCH), bank)[-1].state
+    fresh = policy.initial_state(BATCH)
+    with_memory, without_lstm, without_graph = (
+        policy.act(step_of(observation, 0), state, bank)
+        for state in (start, start._replace(lstm=fresh.lstm), start._replace(zone=fresh.zone))
+    )
+    assert not torch.allclose(with_memory.logits, without_lstm.logits)
+    assert not torch.allclose(with_memory.state.zone.nodes, without_graph.state.zone.nodes)
 
 
 def unroll_once(policy: ActorCritic, bank: GraphBank) -> None:
     """Act and go back over it, so that every parameter has its gradient."""
-    observation = make_observation(STEPS, BATCH)
-    start = state = policy.initial_state(BATCH)
-    guidances = []
-    for t in range(STEPS):
-        decision = policy.act(step_of(observation, t), state, bank)
-        state = decision.state
-        guidances.append(decision.guidance)
+    observation, start = make_observation(STEPS, BATCH), policy.initial_state(BATCH)
+    guidances = [decision.guidance for decision in act_over(policy, observation, start, bank)]
     guidance = Guidance(*map(torch.stack, zip(*guidances, strict=True)))
     unrolled = policy.unroll(observation, start, guidance, bank)
     loss = unrolled.logits.square().sum() + unrolled.values.sum()
@@ -68,6 +91,13 @@ def test_only_known_scenes_are_used(bank: GraphBank) -> None:
     policy = make_policy(CONFIG.policy, CONFIG.seed)
     decision = policy.act(make_observation(64), policy.initial_state(64), bank)
     assert set(decision.guidance.scene.tolist()) <= {0, 2}  # kitchen and bedroom
+
+
+def test_without_the_scene_layer_the_rooms_own_graph_is_used(bank: GraphBank) -> None:
+    policy = make_policy(RunConfig(without=("scene",)).policy, 0)
+    observation = make_observation(64)
+    used = policy.act(observation, policy.initial_state(64), bank).guidance.scene.tolist()
+    assert used == [scene if scene in {0, 2} else 0 for scene in observation.scene.tolist()]
 
 
 def test_methods_differ_by_their_layers() -> None:

@@ -39,9 +39,12 @@ def test_a_reset_forgets_everything_before_it() -> None:
     lstm = EpisodicLSTM(5, CELLS, 2)
     inputs, first = torch.randn(6, 2, 5), torch.zeros(6, 2, dtype=torch.bool)
     first[3, 1] = True
+    state = torch.randn(2, 2, 2, CELLS)
     with torch.no_grad():
-        outputs, _ = lstm(inputs, first, torch.randn(2, 2, 2, CELLS))
+        outputs, _ = lstm(inputs, first, state)
+        untouched, _ = lstm(inputs, torch.zeros_like(first), state)
         fresh, _ = lstm(inputs[3:, 1:], first[3:, 1:], lstm.initial_state(1))
-        untouched, _ = lstm(inputs, torch.zeros_like(first), torch.randn(2, 2, 2, CELLS))
     torch.testing.assert_close(outputs[3:, 1:], fresh)
-    assert not torch.allclose(outputs[3:, 0], untouched[3:, 0])
+    assert not torch.allclose(outputs[3:, 1], untouched[3:, 1])
+    torch.testing.assert_close(outputs[:3, 1], untouched[:3, 1])
+    torch.testing.assert_close(outputs[:, 0], untouched[:, 0])  # the other episode goes on
