@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save_file
 
+from hoz_dist.atomic import remove_left_overs, replace_file
 from hoz_dist.config import RunConfig
 from hoz_dist.errors import DamagedFileError, HozError, InvalidValueError, NotFoundError
 from hoz_dist.graph.room_graph import RoomGraph
 from hoz_dist.graph.scene_graph import SceneGraph, merge_rooms
-from learner.files import TEMPORARY_SUFFIX, replace_file
 from learner.optimizer import AdamState, Vector
 
 FORMAT: Final = 1
@@ -138,8 +138,7 @@ def checkpoint_files(folder: Path) -> list[Path]:
 
 def _prune(folder: Path, newest: Path) -> None:
     """Delete what is too old, and what a killed process left half-written."""
-    for left_over in folder.glob(f"*{TEMPORARY_SUFFIX}"):
-        left_over.unlink(missing_ok=True)
+    remove_left_overs(folder)
     droppable = [file for file in checkpoint_files(folder) if not file.with_suffix(KEPT_SUFFIX).exists()]
     for file in droppable[NEWEST_KEPT:]:
         # After a damaged checkpoint of a higher version, the one just written is not the first of the list.

@@ -9,10 +9,10 @@ from typing import Final
 
 from filelock import FileLock, Timeout
 
+from hoz_dist.atomic import TEMPORARY_SUFFIX, replace_file
 from hoz_dist.config import RunConfig
 from hoz_dist.errors import DamagedFileError, HozError, InvalidValueError, NotFoundError, RunMismatchError
 from learner.checkpoint import FOLDER, Checkpoint, checkpoint_files, load_checkpoint
-from learner.files import TEMPORARY_SUFFIX, replace_file
 
 CONFIG_FILE: Final = "config.json"
 LOCK_FILE: Final = "learner.lock"
@@ -103,7 +103,7 @@ def _refuse_foreign(path: Path) -> None:
         message = f"'{path}' is a file; choose a folder for the run."
         raise InvalidValueError(message)
     # These are what a learner leaves that was killed before it had written the configuration.
-    names = {entry.name for entry in path.iterdir()} - {LOCK_FILE, CONFIG_FILE + TEMPORARY_SUFFIX}
+    names = {entry.name for entry in path.iterdir() if entry.suffix != TEMPORARY_SUFFIX} - {LOCK_FILE}
     if names and CONFIG_FILE not in names:
         message = f"'{path}' holds files but is not a run; choose an empty or a new folder."
         raise InvalidValueError(message)

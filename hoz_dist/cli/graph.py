@@ -42,9 +42,9 @@ def build_command(*, names: tuple[str, ...], output: Path | None, zones: int, ca
 
     SCENE such as kitchen stands for all its training rooms, ROOM such as kitchen/3 for one.
     """
+    from hoz_dist.atomic import check_writable
     from hoz_dist.cli.progress import Progress
     from hoz_dist.errors import InvalidValueError
-    from hoz_dist.graph.atomic import check_writable
     from hoz_dist.graph.checks import check_zone_count
     from hoz_dist.graph.files import format_of, save_graph
     from hoz_dist.graph.room_graph import explore_room
@@ -182,8 +182,8 @@ def plot_command(
     *, file: Path, output: Path | None, room: str | None, top: int, scene: str | None, cache: Path | None, force: bool
 ) -> None:
     """Draw a scene graph: its zones, what is seen in them and how close they are."""
+    from hoz_dist.atomic import check_writable, write_atomically
     from hoz_dist.errors import InvalidValueError
-    from hoz_dist.graph.atomic import check_writable, write_atomically
     from hoz_dist.graph.files import load_graph
     from hoz_dist.graph.update import current_zone
     from hoz_dist.nav.categories import TARGETS

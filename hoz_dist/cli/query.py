@@ -56,7 +56,7 @@ def query_command(
 
     shape = chosen or _format_of(output)
     if output is not None:
-        from hoz_dist.graph.atomic import check_writable
+        from hoz_dist.atomic import check_writable
 
         check_writable(output, overwrite=force)
     elif shape in _BINARY and sys.stdout.isatty():
@@ -74,7 +74,7 @@ def query_command(
     if output is None:
         click.echo(content, nl=False)
         return
-    from hoz_dist.graph.atomic import write_atomically
+    from hoz_dist.atomic import write_atomically
 
     write_atomically(output, content, overwrite=force)
     click.echo(f"Wrote {output}.")

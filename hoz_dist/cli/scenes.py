@@ -92,8 +92,8 @@ def render_command(
     Views that are there already are kept.
     """
     rooms = list(dict.fromkeys(room for name in names for room in _rooms(name, split)))
+    from hoz_dist.atomic import check_writable, write_atomically
     from hoz_dist.cli.rendering import Encoding, contact_sheet, render_rooms
-    from hoz_dist.graph.atomic import check_writable, write_atomically
     from hoz_dist.sim.view_store import ViewStore, default_cache
 
     if output is not None:

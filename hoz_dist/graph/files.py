@@ -7,8 +7,8 @@ import json
 from pathlib import Path
 from typing import Final, Literal
 
+from hoz_dist.atomic import write_atomically
 from hoz_dist.errors import DamagedFileError, InvalidValueError, NotFoundError
-from hoz_dist.graph.atomic import write_atomically
 from hoz_dist.graph.matlab import from_matlab, scene_of_file, to_matlab
 from hoz_dist.graph.plain import from_plain, to_plain
 from hoz_dist.graph.scene_graph import SceneGraph
