@@ -12,10 +12,10 @@ from hoz_dist.errors import NotFoundError
 from hoz_dist.evaluation.agents import PolicyAgent
 from hoz_dist.evaluation.benchmark import Benchmark, Comparison, compare
 from hoz_dist.evaluation.loading import load_agent, matching_encoder
+from hoz_dist.evaluation.trials import stored_views
 from hoz_dist.nav.categories import SCENES, scene_index
 from hoz_dist.nav.rooms import Split, rooms_of
 from hoz_dist.sim.live import LiveViews
-from hoz_dist.sim.view_source import StoredViews
 from hoz_dist.sim.view_store import ViewStore, default_cache
 from learner.checkpoint import Checkpoint
 
@@ -60,7 +60,7 @@ def measure(
     torch.set_num_threads(1)
     for scene in scenes:
         scene_index(scene)
-    trained = {room.room.partition("/")[0] for room in checkpoint.rooms}
+    trained = set(checkpoint.graph_versions)
     wanted = [scene for scene in SCENES if scene in (set(scenes) or trained)]
     if not wanted:
         message = "The checkpoint was saved before any room was explored; train longer, or name scenes by --scene."
@@ -73,11 +73,13 @@ def measure(
     names = [room for scene in wanted for room in rooms_of(scene, split)]
     missing = [room for room in names if not store.holds(room, encoder)]
     if missing:
-        render_rooms(missing, folder, config.picture_size, os.cpu_count() or 1, Encoding(config.encoder, weights))
+        render_rooms(
+            missing, folder, config.picture_size, len(os.sched_getaffinity(0)), Encoding(config.encoder, weights)
+        )
     rooms = [store.open(room, encoder) for room in names]
     benchmark = Benchmark.of(rooms, split, episodes)
     trials = 2 * len(seeds) + 1  # of Random and the policy; Oracle draws nothing and has one
     with Progress("Evaluating", len(benchmark.episodes) * trials, "episodes") as progress:
-        source = partial(LiveViews, encoder, config.picture_size) if live else StoredViews
+        source = partial(LiveViews, encoder, config.picture_size) if live else stored_views
         comparison = compare(benchmark, agent, list(seeds), source, progress.update)
     return Measurement(comparison, benchmark, agent)

@@ -1,6 +1,7 @@
 """What `hoz-dist train` leaves behind and shows at its end: results, pictures, and the commands to try next."""
 
 import json
+import shlex
 from pathlib import Path
 from typing import Final
 
@@ -11,15 +12,16 @@ from hoz_dist.cli.measure import Measurement, measure
 from hoz_dist.cli.progress import duration
 from hoz_dist.evaluation.table import comparison_table
 from hoz_dist.evaluation.trials import trace_episodes
+from hoz_dist.nav.categories import SCENES
 from hoz_dist.nav.episode import Episode
 from hoz_dist.sim.catalogue import load_room
 from hoz_dist.viz.trajectory import Trajectory, draw_trajectories
 from hoz_dist.viz.zones import png, scene_graph_figure
+from hoz_dist.wire.endpoint import DEFAULT_ENDPOINT
 from learner.checkpoint import Checkpoint, load_checkpoint
 
 RESULTS_FILE: Final = "evaluation.json"
 TRAJECTORIES_FILE: Final = "trajectories.png"
-_DRAWN_PER_SCENE: Final = 2
 
 
 def report(run: Path, *, episodes: int, seed: int, weights: Path | None, cache: Path | None) -> None:
@@ -47,7 +49,9 @@ def report(run: Path, *, episodes: int, seed: int, weights: Path | None, cache: 
         pictures.append(_draw_trajectories(measurement, run / TRAJECTORIES_FILE, seed))
     click.echo("Pictures: " + ", ".join(map(str, pictures)))
     click.echo("Try next:")
-    for command in _next_commands(run, checkpoint):
+    files = [] if weights is None else ["--weights", str(weights)]
+    files += [] if cache is None else ["--cache", str(cache)]
+    for command in _next_commands(run, next(iter(checkpoint.graph_versions), SCENES[0]), files):
         click.echo(f"  {command}")
 
 
@@ -61,15 +65,13 @@ def _draw_graphs(checkpoint: Checkpoint, run: Path) -> list[Path]:
 
 
 def _draw_trajectories(measurement: Measurement, path: Path, seed: int) -> Path:
-    """Draw the same episodes, some of each scene, by the agent and by Oracle's length in the title."""
+    """Draw the agent's way in a few episodes of each scene: the longest and the median one by L*."""
     benchmark = measurement.benchmark
     chosen: list[Episode] = []
     for scene in benchmark.scenes:
-        # Longer episodes show more of the search.
         of_scene = [episode for episode in benchmark.episodes if episode.room.scene == scene]
-        chosen += sorted(of_scene, key=lambda episode: -episode.optimal)[: len(of_scene) // 2][
-            :: max(1, len(of_scene) // 4)
-        ][:_DRAWN_PER_SCENE]
+        by_length = sorted(of_scene, key=lambda episode: episode.optimal)
+        chosen += dict.fromkeys((by_length[-1], by_length[len(by_length) // 2]))
     results, ways = trace_episodes(measurement.agent, benchmark.rooms, chosen, seed)
     graphs = {views.room: views.graph for views in benchmark.rooms}
     draw_trajectories(
@@ -82,13 +84,20 @@ def _draw_trajectories(measurement: Measurement, path: Path, seed: int) -> Path:
     return path
 
 
-def _next_commands(run: Path, checkpoint: Checkpoint) -> list[str]:
-    scenes = sorted(checkpoint.scene_graphs())
-    scene = scenes[0] if scenes else "kitchen"
-    return [
-        f"hoz-dist evaluate {run} --split test",
-        f"tensorboard --logdir {run / 'tensorboard'}",
-        f"hoz-dist learner --listen tcp/127.0.0.1:7447 --run {run.parent / 'shared'}",
-        f"hoz-dist actor --scene {scene} --connect tcp/127.0.0.1:7447",
-        f"hoz-dist query {scene} --connect tcp/127.0.0.1:7447",
+def _next_commands(run: Path, scene: str, files: list[str]) -> list[str]:
+    """Return commands to try, fit to be pasted into a shell.
+
+    Args:
+        run: Folder of the run.
+        scene: A scene of the run.
+        files: Options that name the cache and the weights, if they were given.
+    """
+    connect = ["--connect", DEFAULT_ENDPOINT]
+    commands = [
+        ["hoz-dist", "evaluate", str(run), "--split", "test", *files],
+        ["tensorboard", "--logdir", str(run / "tensorboard")],
+        ["hoz-dist", "learner", "--listen", DEFAULT_ENDPOINT],
+        ["hoz-dist", "actor", "--scene", scene, *connect],
+        ["hoz-dist", "query", scene, *connect],
     ]
+    return list(map(shlex.join, commands))

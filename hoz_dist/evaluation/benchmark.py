@@ -5,13 +5,12 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from hoz_dist.evaluation.agents import Agent, OracleAgent, PolicyAgent, RandomAgent
-from hoz_dist.evaluation.trials import Evaluation, SourceFactory, run_trials
+from hoz_dist.evaluation.trials import Evaluation, SourceFactory, run_trials, stored_views
 from hoz_dist.nav.categories import SCENES
 from hoz_dist.nav.episode import Episode
 from hoz_dist.nav.rooms import Split
 from hoz_dist.sim.episodes import episode_list
 from hoz_dist.sim.room_views import RoomViews
-from hoz_dist.sim.view_source import StoredViews
 
 EPISODE_SEED: Final = 2021
 """Seed of the list of episodes: the same list for every agent, trial and run."""
@@ -51,7 +50,7 @@ class Benchmark:
         self,
         agent: Agent,
         seeds: Sequence[int],
-        source: SourceFactory = StoredViews,
+        source: SourceFactory = stored_views,
         progress: Callable[[int, int], None] | None = None,
     ) -> Evaluation:
         """Run one agent, one trial per seed; see `run_trials`."""
@@ -88,7 +87,7 @@ def compare(
     benchmark: Benchmark,
     policy: PolicyAgent,
     seeds: Sequence[int],
-    source: SourceFactory = StoredViews,
+    source: SourceFactory = stored_views,
     progress: Callable[[int, str], None] | None = None,
 ) -> Comparison:
     """Run Random, a policy and Oracle on a benchmark.
@@ -102,7 +101,7 @@ def compare(
     """
     before = 0
 
-    def run(agent: Agent, trial_seeds: Sequence[int], views: SourceFactory = StoredViews) -> Evaluation:
+    def run(agent: Agent, trial_seeds: Sequence[int], views: SourceFactory = stored_views) -> Evaluation:
         nonlocal before
 
         def report(done: int, total: int) -> None:

@@ -1,8 +1,8 @@
 """Trials: the same episodes again and again, with actions drawn from another seed each time."""
 
 import statistics
-from collections.abc import Callable, Iterable, Sequence
-from contextlib import AbstractContextManager, ExitStack
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,8 +16,13 @@ from hoz_dist.sim.episode_runner import EpisodeRunner
 from hoz_dist.sim.room_views import RoomViews
 from hoz_dist.sim.view_source import StoredViews, ViewSource
 
-SourceFactory = Callable[[], ViewSource]
-"""Makes a new source of observations; one that is a context manager is closed after use."""
+SourceFactory = Callable[[], AbstractContextManager[ViewSource]]
+"""Makes a new source of observations, which is closed after use."""
+
+
+def stored_views() -> AbstractContextManager[ViewSource]:
+    """Make a source of stored views."""
+    return nullcontext(StoredViews())
 
 
 @dataclass(frozen=True)
@@ -58,7 +63,7 @@ def run_trials(
     seeds: Iterable[int],
     *,
     split: str,
-    source: SourceFactory = StoredViews,
+    source: SourceFactory = stored_views,
     progress: Callable[[int, int], None] | None = None,
 ) -> Evaluation:
     """Run an agent over all episodes, once for each seed.
@@ -76,16 +81,11 @@ def run_trials(
     total = len(all_seeds) * len(episodes)
     trials = []
     for number, seed in enumerate(all_seeds):
-        with ExitStack() as stack:
-            views = source()
-            if isinstance(views, AbstractContextManager):
-                stack.enter_context(views)
+        with source() as views:
             runner = EpisodeRunner(rooms, episodes, source=views)
-            agent.begin(runner, np.random.default_rng(seed))
-            while runner.active.any():
-                runner.step(agent.act(runner))
+            for ended in _play(agent, runner, seed):
                 if progress is not None:
-                    progress(number * len(episodes) + int((~runner.active).sum()), total)
+                    progress(number * len(episodes) + ended, total)
         trials.append(tuple(runner.results()))
     return Evaluation(agent.name, split, tuple(trials))
 
@@ -93,12 +93,29 @@ def run_trials(
 def trace_episodes(
     agent: Agent, rooms: Sequence[RoomViews], episodes: Sequence[Episode], seed: int
 ) -> tuple[list[EpisodeResult], list[NDArray[np.int64]]]:
-    """Run an agent over episodes once, and return the results and the views that each episode visited."""
+    """Run an agent over episodes once.
+
+    Args:
+        agent: Who acts.
+        rooms: The rooms of the episodes.
+        episodes: What to run.
+        seed: Seed of the actions.
+
+    Returns:
+        The results, and the views that each episode visited, its start first, [actions + 1].
+    """
     runner = EpisodeRunner(rooms, episodes)
+    for _ in _play(agent, runner, seed):
+        pass
+    return runner.results(), runner.trajectories()
+
+
+def _play(agent: Agent, runner: EpisodeRunner, seed: int) -> Iterator[int]:
+    """Run all episodes to their ends; after each step, yield the number of those that have ended."""
     agent.begin(runner, np.random.default_rng(seed))
     while runner.active.any():
         runner.step(agent.act(runner))
-    return runner.results(), runner.trajectories()
+        yield int((~runner.active).sum())
 
 
 def _spread(metrics: list[Metrics]) -> dict[str, Any]:

@@ -2,23 +2,23 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.patches import Rectangle
+from matplotlib.patches import FancyBboxPatch, Rectangle
 from numpy.typing import NDArray
 
 from hoz_dist.nav.categories import TARGETS
 from hoz_dist.nav.episode import SUCCESS_DISTANCE_M, EpisodeResult
 from hoz_dist.nav.pose import GRID_M
 from hoz_dist.sim.pose_graph import PoseGraph
-from hoz_dist.sim.room import Item, Room
+from hoz_dist.sim.room import Item, Part, Room
 
-_FLOOR_ITEM_M = 0.05
-"""Items that reach no higher than this, metres, are rugs and floors and are drawn lightest."""
+_OVERHEAD_M: Final = 2.0
+"""What begins above this height, metres, such as the ceiling, would hide all else."""
 
 
 class Trajectory(NamedTuple):
@@ -49,6 +49,10 @@ def draw_trajectories(trajectories: Sequence[Trajectory], path: Path) -> None:
         _draw(axis, trajectory)
     for axis in axes[len(trajectories) :]:
         axis.set_axis_off()
+    figure.suptitle(
+        "dot: start; star: end, green where the target was found; orange: the target; dotted: near enough for success",
+        fontsize=9,
+    )
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path, dpi=110)
 
@@ -56,8 +60,12 @@ def draw_trajectories(trajectories: Sequence[Trajectory], path: Path) -> None:
 def _draw(axis: Axes, trajectory: Trajectory) -> None:
     room, graph, result = trajectory.room, trajectory.graph, trajectory.result
     target = TARGETS[result.target]
-    for item in sorted(room.items, key=lambda item: item.high[2]):
-        _draw_item(axis, item, is_target=item.category == target)
+    parts = [part for item in room.items for part in item.parts if part.low[2] < _OVERHEAD_M]
+    for part in sorted(parts, key=lambda part: part.high[2]):
+        _draw_part(axis, part)
+    for item in room.items:
+        if item.category == target:
+            _draw_target(axis, item)
     reachable = graph.positions * GRID_M
     axis.scatter(reachable[:, 0], reachable[:, 1], s=2, color="0.75", zorder=2)
 
@@ -79,26 +87,17 @@ def _draw(axis: Axes, trajectory: Trajectory) -> None:
     axis.tick_params(labelsize=7)
 
 
-def _draw_item(axis: Axes, item: Item, *, is_target: bool) -> None:
-    (x0, z0, _), (x1, z1, height) = item.low, item.high
-    if is_target:
-        centre = ((x0 + x1) / 2, (z0 + z1) / 2)
-        axis.add_patch(Rectangle((x0, z0), x1 - x0, z1 - z0, facecolor="tab:orange", edgecolor="black", zorder=3))
-        axis.plot(*centre, "x", color="black", markersize=6, zorder=3)
-        axis.add_patch(
-            Rectangle(
-                (x0 - SUCCESS_DISTANCE_M, z0 - SUCCESS_DISTANCE_M),
-                x1 - x0 + 2 * SUCCESS_DISTANCE_M,
-                z1 - z0 + 2 * SUCCESS_DISTANCE_M,
-                fill=False,
-                linestyle=":",
-                edgecolor="tab:orange",
-                zorder=3,
-            )
-        )
-        return
-    for part in item.parts:
-        (px, pz, _), (sx, sz, _) = part.low, part.size
-        shade = 0.97 if height <= _FLOOR_ITEM_M else 0.88
-        colour = tuple(shade * 0.6 + channel * 0.4 for channel in part.colour)
-        axis.add_patch(Rectangle((px, pz), sx, sz, facecolor=colour, edgecolor="0.6", linewidth=0.4, zorder=1))
+def _draw_part(axis: Axes, part: Part) -> None:
+    (x, z, _), (width, depth, _) = part.low, part.size
+    # Paled, so that the way stands out.
+    colour = tuple(0.5 + 0.5 * channel for channel in part.colour)
+    axis.add_patch(Rectangle((x, z), width, depth, facecolor=colour, edgecolor="0.6", linewidth=0.3, zorder=1))
+
+
+def _draw_target(axis: Axes, item: Item) -> None:
+    (x0, z0, _), (x1, z1, _) = item.low, item.high
+    width, depth, orange = x1 - x0, z1 - z0, "tab:orange"
+    axis.add_patch(Rectangle((x0, z0), width, depth, facecolor=orange, edgecolor="black", zorder=3))
+    axis.plot((x0 + x1) / 2, (z0 + z1) / 2, "x", color="black", markersize=6, zorder=3)
+    reach = f"round,pad={SUCCESS_DISTANCE_M}"
+    axis.add_patch(FancyBboxPatch((x0, z0), width, depth, reach, fill=False, linestyle=":", edgecolor=orange, zorder=3))
