@@ -1,13 +1,19 @@
 """`hoz-dist actor`: an actor process that trains in its rooms for a learner."""
 
 import os
+import re
 import socket
 from pathlib import Path
+from typing import Final
 
 import click
 
+from hoz_dist.cli.connecting import connect_option, run_option
 from hoz_dist.cli.options import cache_option
 from hoz_dist.nav.categories import SCENES
+
+CONNECT_S: Final = 5.0
+"""How long to try to reach the learner or router, seconds; it may be starting again."""
 
 
 @click.command("actor")
@@ -19,14 +25,8 @@ from hoz_dist.nav.categories import SCENES
     metavar="SCENE|ROOM",
     help=f"Scene ({', '.join(SCENES)}: all its training rooms) or training room (kitchen/3); may be repeated.",
 )
-@click.option(
-    "--connect",
-    metavar="ENDPOINT",
-    default="tcp/127.0.0.1:7447",
-    show_default=True,
-    help="Endpoint of the learner or of a router.",
-)
-@click.option("--run", metavar="NAME", help="Name of the run to join.  [default: the only one that is found]")
+@connect_option
+@run_option
 @click.option(
     "--name",
     help="Name of this actor, unique in the run; its episodes follow from it and the run's seed.  [default: HOST-PID]",
@@ -65,7 +65,7 @@ def actor_command(
     stop = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop.set())
-    with open_client(connect) as session:
+    with open_client(connect, CONNECT_S) as session:
         # Only now, that somebody answers: these take seconds to import.
         import torch
 
@@ -78,7 +78,7 @@ def actor_command(
 
         # A process is one thread: actors share the cores, and one thread adds up the same way every time.
         torch.set_num_threads(1)
-        actor = name or f"{socket.gethostname()}-{os.getpid()}"
+        actor = name or _default_name()
         with LearnerLink(session, actor, run, stop) as link, ExitStack() as stack:
             size = link.config.picture_size
             encoder = matching_encoder(link.config, weights)
@@ -86,3 +86,9 @@ def actor_command(
             source = stack.enter_context(LiveViews(encoder, size)) if live else StoredViews()
             logging.getLogger("hoz_dist").info("%s joins run %s with %d rooms", actor, link.run, len(rooms))
             Actor(link, rooms, store, encoder, source, actor, stop).run()
+
+
+def _default_name() -> str:
+    """Return HOST-PID, fit for a key expression: Kubernetes has host names that are as long as a name may be."""
+    host = re.sub(r"[^A-Za-z0-9._-]", "-", socket.gethostname()).lstrip("._-")[:40]
+    return f"{host or 'host'}-{os.getpid()}"
