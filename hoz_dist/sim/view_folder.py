@@ -14,14 +14,17 @@ Nothing here is trusted: what does not match its checksum counts as missing and 
 
 import json
 import shutil
-from collections.abc import Mapping
+import warnings
+from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
-from typing import Any, Final, NamedTuple, Self
+from typing import Any, Final, NamedTuple, Self, TypeVar
 
 import numpy as np
 import xxhash
 from numpy.typing import NDArray
 
+from hoz_dist.atomic import remove_left_overs, replace_file
 from hoz_dist.errors import DamagedFileError
 from hoz_dist.nav.pose import VIEWS_PER_POSITION
 from hoz_dist.sim.pose_graph import PoseGraph
@@ -29,9 +32,12 @@ from hoz_dist.sim.pose_graph import PoseGraph
 _HEADER: Final = "header.json"
 _CHECKSUMS: Final = "checksums.npy"
 _GRAPH_FILES: Final = ("positions", "transitions")
+DERIVED: Final = ("features", "detections", "appearance", "success", "optimal")
+"""Names of the arrays that are derived from all pictures of a room, as in `hoz_dist.sim.room_views.RoomViews`."""
 _DTYPES: Final = {"rgb": np.uint8, "depth": np.float16, "segmentation": np.uint8}
 _Array = NDArray[Any]
 _Map = np.memmap[Any, Any]
+_Content = TypeVar("_Content")
 
 
 class Frames(NamedTuple):
@@ -61,28 +67,28 @@ class ViewFolder:
         self._checksums = checksums
 
     @classmethod
-    def open(cls, path: Path, size: int) -> Self:
+    def open(cls, path: Path, size: int | None = None) -> Self:
         """Open a folder.
 
         Args:
             path: The folder.
-            size: S, side of its pictures.
+            size: S, side of its pictures; any if None.
 
         Raises:
-            DamagedFileError: The folder is not there, or its header, pose graph or the length of a file is wrong.
+            DamagedFileError: The folder is not there, or its header, its pose graph, or the length, type or shape of
+                an array is wrong.
         """
-        try:
-            digests = json.loads((path / _HEADER).read_text())
-            positions, transitions = (np.array(_load(path / f"{name}.npy")) for name in _GRAPH_FILES)
-            frames = {name: _load(path / f"{name}.npy") for name in Frames._fields}
-            checksums = _load(path / _CHECKSUMS)
-        except (OSError, ValueError) as error:
-            raise _damaged(path) from error
-        graph = PoseGraph(positions, transitions)
-        whole = digests == _graph_digests(graph) and checksums.shape == (len(positions),)
-        if not whole or [array.shape[1:] for array in frames.values()] != list(_picture_shapes(size).values()):
+        digests = _read(_json, path / _HEADER)
+        graph = PoseGraph(*(np.array(_read(_array, path / f"{name}.npy")) for name in _GRAPH_FILES))
+        if digests != _graph_digests(graph):
             raise _damaged(path)
-        if any(len(array) != graph.views for array in frames.values()):
+        frames = {name: _read(_array, path / f"{name}.npy") for name in Frames._fields}
+        checksums = _read(_array, path / _CHECKSUMS)
+        whole = _is(checksums, np.uint64, (len(graph.positions),))
+        side = (0, *frames["segmentation"].shape)[-1] if size is None else size
+        for name, shape in _picture_shapes(side).items():
+            whole = whole and _is(frames[name], _DTYPES[name], (graph.views, *shape))
+        if not whole:
             raise _damaged(path)
         return cls(path, graph, frames, checksums)
 
@@ -134,53 +140,67 @@ class ViewFolder:
         _overwrite(self._checksums, position * checksum.nbytes, checksum)
 
     def load_derived(self, name: str) -> dict[str, _Array] | None:
-        """Return the arrays derived under a name, memory-mapped, or None when they are not there or damaged."""
+        """Return the arrays `DERIVED` under a name, memory-mapped, or None when they are not there or damaged."""
         try:
-            digests = json.loads((self.path / f"{name}.json").read_text())
-            arrays = {array_name: _load(self.path / f"{name}.{array_name}.npy") for array_name in digests}
-        except (OSError, ValueError):
+            digests = _read(_json, self.path / f"{name}.json")
+            arrays = {array_name: _read(_array, self.path / f"{name}.{array_name}.npy") for array_name in DERIVED}
+        except DamagedFileError:
             return None
-        whole = all(_digest(array) == digests[array_name] for array_name, array in arrays.items())
-        return dict(arrays) if whole else None
+        return dict(arrays) if digests == _digests(arrays) else None
 
     def save_derived(self, name: str, arrays: Mapping[str, _Array]) -> None:
-        """Store arrays derived from all pictures under a name.
-
-        Each file is written under a temporary name and renamed, the digests last.
+        """Store the arrays `DERIVED` under a name, their digests last; the caller holds the room's lock.
 
         Raises:
             OSError: The cache cannot be written.
         """
+        remove_left_overs(self.path)
         for array_name, array in arrays.items():
-            path = self.path / f"{name}.{array_name}.npy"
-            temporary = path.with_suffix(".tmp")
-            with temporary.open("wb") as file:
-                np.save(file, array)
-            temporary.replace(path)
-        temporary = self.path / f"{name}.tmp"
-        temporary.write_text(json.dumps({array_name: _digest(array) for array_name, array in arrays.items()}))
-        temporary.replace(self.path / f"{name}.json")
+            replace_file(self.path / f"{name}.{array_name}.npy", partial(_save, array))
+        digests = json.dumps(_digests(arrays))
+        replace_file(self.path / f"{name}.json", lambda temporary: temporary.write_text(digests))
 
 
 def _damaged(path: Path) -> DamagedFileError:
-    return DamagedFileError(f"View folder {path} is missing or damaged.")
+    return DamagedFileError(f"{path} in the view cache is missing or damaged.")
 
 
 def _picture_shapes(size: int) -> dict[str, tuple[int, ...]]:
     return {"rgb": (size, size, 3), "depth": (size, size), "segmentation": (size, size)}
 
 
-def _load(path: Path) -> _Map:
-    """Map an array's file.
+def _read(read: Callable[[Path], _Content], path: Path) -> _Content:
+    """Read a file that may be missing or damaged.
 
     Raises:
-        OSError: The file cannot be read.
-        ValueError: It is not an array, or too short.
+        DamagedFileError: Whatever goes wrong. NumPy's parser of headers hands over what Python's tokenizer, parser and
+            `mmap` make of damage: SyntaxError, TokenError, ValueError, OverflowError, MemoryError, ...
     """
     try:
+        return read(path)
+    except Exception as error:
+        raise _damaged(path) from error
+
+
+def _json(path: Path) -> object:
+    content: object = json.loads(path.read_text())
+    return content
+
+
+def _array(path: Path) -> _Map:
+    """Map an array's file; what its header only warns of is damage as well, since the store wrote it."""
+    with warnings.catch_warnings(action="error"):
         return np.lib.format.open_memmap(path, "r")
-    except EOFError as error:
-        raise ValueError(path) from error
+
+
+def _save(array: _Array, path: Path) -> None:
+    with path.open("wb") as file:
+        np.save(file, array)
+
+
+def _is(array: _Map, dtype: type[np.generic], shape: tuple[int, ...]) -> bool:
+    """Tell whether an array has exactly this type, byte order included, and shape, and lies row by row."""
+    return array.dtype == np.dtype(dtype) and array.shape == shape and array.flags.c_contiguous
 
 
 def _overwrite(array: _Map, offset: int, rows: _Array) -> None:
@@ -194,8 +214,12 @@ def _digest(array: _Array) -> str:
     return f"{array.dtype.str}{list(array.shape)} {xxhash.xxh3_64_hexdigest(np.ascontiguousarray(array).data)}"
 
 
+def _digests(arrays: Mapping[str, _Array]) -> dict[str, str]:
+    return {name: _digest(array) for name, array in arrays.items()}
+
+
 def _graph_digests(graph: PoseGraph) -> dict[str, str]:
-    return {name: _digest(getattr(graph, name)) for name in _GRAPH_FILES}
+    return _digests({name: getattr(graph, name) for name in _GRAPH_FILES})
 
 
 def _frames_digest(frames: Frames) -> int:

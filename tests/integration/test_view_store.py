@@ -148,6 +148,12 @@ def overwrite(path: Path) -> None:
     path.write_bytes(content)
 
 
+def spoil_the_start(path: Path) -> None:
+    content = bytearray(path.read_bytes())
+    content[13] ^= 0x08
+    path.write_bytes(content)
+
+
 def empty(path: Path) -> None:
     path.write_bytes(b"")
 
@@ -156,7 +162,7 @@ def delete(path: Path) -> None:
     path.unlink()
 
 
-@pytest.mark.parametrize("harm", [truncate, overwrite, empty, delete])
+@pytest.mark.parametrize("harm", [truncate, overwrite, spoil_the_start, empty, delete])
 @pytest.mark.parametrize(
     "pattern", ["header.json", "positions.npy", "checksums.npy", "rgb.npy", "tiny-1-*.json", "*.features.npy"]
 )
