@@ -79,20 +79,23 @@ def _connect(endpoint: str, learner: Child) -> HozClient | None:
 def _watch(client: HozClient, learner: Child, children: Children) -> None:
     """Show the progress until the learner ends."""
     pause = threading.Event()
-    finished, summary = False, ""
+    actors = [child for child in children if child is not learner]
+    summary = ""
     with Progress("Training", 1.0, None) as progress:
-        while learner.status != 0:
-            # Actors that find no learner at the end of a run have not failed.
-            for child in [learner] if finished else children:
-                child.restart_if_killed()
+        while (ended := learner.status) != 0:
+            if ended is not None:
+                learner.keep_running()
             try:
                 status = client.status()
             except HozError:
-                status = None  # it is ending, or starting again
+                status = None  # the learner is ending, or starting again
             if status is not None:
-                finished, summary = status["finished"], _summary(status)
+                summary = _summary(status)
                 # A run that goes on has begun before this process.
                 progress.update(status["progress"] or 0.0, summary, left=status["seconds_left"])
+            # Actors that find no learner, or a finished run, end; that is no failure.
+            for actor in actors if status is not None and not status["finished"] else ():
+                actor.keep_running()
             pause.wait(POLL_S)
         progress.update(1.0, summary)
 

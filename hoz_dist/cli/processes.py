@@ -42,20 +42,20 @@ class Child:
         """Exit status, negative for a signal; None while it runs."""
         return self._process.poll()
 
-    def restart_if_killed(self) -> None:
-        """Start the process again if something killed it.
+    def keep_running(self) -> None:
+        """Start the process again if something killed or stopped it.
 
         Raises:
             HozError: It failed by itself, or was killed too often.
         """
         status = self.status
-        if status is None or status == 0:
+        if status is None:
             return
         if status > 0 or self._restarts >= MOST_RESTARTS:
             message = f"The {self.name} failed: {self.last_words()}"
             raise HozError(message)
         self._restarts += 1
-        _log.warning("%s was killed by signal %d; starting it again", self.name, -status)
+        _log.warning("%s was stopped (exit status %d); starting it again", self.name, status)
         self._process = self._start()
 
     def last_words(self) -> str:
