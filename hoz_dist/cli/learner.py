@@ -6,6 +6,7 @@ from typing import Any
 
 import click
 
+from hoz_dist.cli.options import picture_size_option
 from hoz_dist.config import PRESET_LEARNING_RATES, RunConfig
 
 
@@ -39,6 +40,7 @@ from hoz_dist.config import PRESET_LEARNING_RATES, RunConfig
     type=click.Path(path_type=Path),
     help="Weights of the resnet18 encoder, .safetensors or .pth.  [default: none needed]",
 )
+@picture_size_option
 @click.option("--zones", type=int, metavar="K", default=RunConfig.zones, show_default=True, help="Zones of a graph.")
 @click.option(
     "--edge-cost",

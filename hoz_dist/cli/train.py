@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from hoz_dist.cli.options import cache_option
+from hoz_dist.cli.options import cache_option, picture_size_option
 from hoz_dist.nav.categories import SCENES
 
 
@@ -57,6 +57,7 @@ from hoz_dist.nav.categories import SCENES
     type=click.Path(path_type=Path),
     help="Weights of the resnet18 encoder, .safetensors or .pth.  [default: none needed]",
 )
+@picture_size_option
 @cache_option
 def train_command(
     run: Path,
@@ -71,6 +72,7 @@ def train_command(
     episodes: int,
     encoder: str,
     weights: Path | None,
+    picture_size: int,
     cache: Path | None,
 ) -> None:
     """Train on this machine, then measure the agent on unseen validation rooms and draw pictures.
@@ -88,6 +90,7 @@ def train_command(
     RunConfig(**choices, minutes=minutes, frames=frames)  # says what is wrong before any process starts
     files = [] if weights is None else ["--weights", str(weights)]
     learner = ["--model", model, "--preset", preset, "--encoder", encoder, "--seed", str(seed), *files]
+    learner += ["--picture-size", str(picture_size)]
     learner += [word for layer in without for word in ("--without", layer)]
     learner += ["--minutes", str(minutes)] if frames is None else ["--frames", str(frames)]
     actor = [word for place in scenes or SCENES for word in ("--scene", place)] + files
