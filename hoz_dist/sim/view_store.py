@@ -9,9 +9,11 @@ same pictures twice is what would cost. Readers take no lock: a position counts 
 """
 
 import hashlib
+import inspect
 import os
+import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
@@ -39,9 +41,21 @@ from hoz_dist.sim.view_folder import Frames, ViewFolder
 FORMAT_VERSION: Final = 1
 """Raised when the files of a room's folder change their meaning."""
 Progress = Callable[[int, int], None]
-"""Called with the number of views done and the number of all views."""
+"""Called with the number of views done and the number of all views; with (0, 1) while another process writes the room.
 
-_PICTURE_SOURCES: Final = ("../nav/pose.py", "world.py", "camera.py", "painter.py", "pose_graph.py")
+An exception from it ends the work.
+"""
+_LOCK_POLL_S: Final = 0.2
+"""How often a process that waits for another one's lock tells its progress, seconds."""
+
+_PICTURE_SOURCES: Final = (
+    "../nav/actions.py",
+    "../nav/pose.py",
+    "world.py",
+    "camera.py",
+    "painter.py",
+    "pose_graph.py",
+)
 _DERIVED_SOURCES: Final = ("../nav/episode.py", "../nav/categories.py", "detections.py", "appearance.py")
 
 
@@ -77,7 +91,8 @@ class ViewStore:
         Args:
             room: The room.
             encoder: Makes the features.
-            progress: Told how far rendering is; not called when nothing is missing.
+            progress: Told how far rendering is, and while another process holds the room, so that it can stop the
+                wait by an exception; not called when nothing is missing.
 
         Raises:
             InvalidValueError: Something is missing and the cache cannot be written.
@@ -90,7 +105,7 @@ class ViewStore:
         except DamagedFileError:
             arrays = None
         if arrays is None:
-            with self._writing(path), Painter(content, self._size) as painter:
+            with self._writing(path, progress), Painter(content, self._size) as painter:
                 folder = self._open_or_create(path, painter)
                 # Another process may have been through this while we waited for the lock.
                 arrays = folder.load_derived(name)
@@ -171,18 +186,28 @@ class ViewStore:
         return self._cache / f"{room.room.scene}-{room.room.number}-{_short_digest(*parts)}"
 
     @contextmanager
-    def _writing(self, path: Path) -> Iterator[None]:
-        """Hold the lock of a room's folder.
+    def _writing(self, path: Path, progress: Progress | None = None) -> Iterator[None]:
+        """Hold the lock of a room's folder; while it waits for it, it tells ``progress``.
 
         Raises:
             InvalidValueError: The cache cannot be written.
         """
         try:
             self._cache.mkdir(parents=True, exist_ok=True)
-            with filelock.FileLock(self._cache / f".{path.name}.lock"):
+            with _acquired(filelock.FileLock(self._cache / f".{path.name}.lock"), progress):
                 yield
         except OSError as error:
             raise _unwritable(self._cache, error.strerror or str(error)) from error
+
+
+def _acquired(lock: filelock.BaseFileLock, progress: Progress | None) -> AbstractContextManager[object]:
+    """Wait for a lock, telling ``progress``; returns what releases it."""
+    while True:
+        try:
+            return lock.acquire(timeout=_LOCK_POLL_S)
+        except filelock.Timeout:
+            if progress is not None:
+                progress(0, 1)
 
 
 def _chunk(folder: ViewFolder, painter: Painter, position: int) -> Frames:
@@ -221,7 +246,17 @@ def _derive(
 def _derived_name(encoder: VisualEncoder) -> str:
     """Return the name of what is derived with an encoder: its key made fit for a file, and a digest."""
     readable = "".join(letter if letter.isalnum() else "-" for letter in encoder.key)[:32]
-    return f"{readable}-{_short_digest(encoder.key, _sources_digest(_DERIVED_SOURCES))}"
+    parts = (encoder.key, _encoder_source(type(encoder)), inspect.getsource(_derive), _sources_digest(_DERIVED_SOURCES))
+    return f"{readable}-{_short_digest(*parts)}"
+
+
+@cache
+def _encoder_source(kind: type[VisualEncoder]) -> str:
+    """Return the source text of the module that an encoder's class is written in; of one from a prompt, nothing."""
+    try:
+        return inspect.getsource(sys.modules[kind.__module__])
+    except (OSError, TypeError):
+        return ""
 
 
 def _short_digest(*parts: object) -> str:
