@@ -22,7 +22,7 @@ from typing import Any, Final, NamedTuple, Self, TypeVar
 
 import numpy as np
 import xxhash
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
 from hoz_dist.atomic import remove_left_overs, replace_file
 from hoz_dist.errors import DamagedFileError
@@ -198,7 +198,7 @@ def _save(array: _Array, path: Path) -> None:
         np.save(file, array)
 
 
-def _is(array: _Map, dtype: type[np.generic], shape: tuple[int, ...]) -> bool:
+def _is(array: _Map, dtype: DTypeLike, shape: tuple[int, ...]) -> bool:
     """Tell whether an array has exactly this type, byte order included, and shape, and lies row by row."""
     return array.dtype == np.dtype(dtype) and array.shape == shape and array.flags.c_contiguous
 

@@ -40,6 +40,11 @@ def pictures(seed: int) -> Frames:
     return frames
 
 
+def same(first: Frames, second: Frames) -> bool:
+    pairs = zip(first._asdict().values(), second._asdict().values(), strict=True)
+    return all(one.dtype == other.dtype and np.array_equal(one, other) for one, other in pairs)
+
+
 def derived(seed: int) -> NDArray[np.float32]:
     return np.random.default_rng(seed).random((POSITIONS * VIEWS_PER_POSITION, 4)).astype(np.float32)
 
@@ -56,7 +61,7 @@ def test_what_is_stored_comes_back(path: Path) -> None:
     for position in range(POSITIONS):
         frames = folder.read(position)
         assert frames is not None
-        assert all(np.array_equal(one, other) for one, other in zip(frames, pictures(position), strict=True))
+        assert same(frames, pictures(position))
     arrays = folder.load_derived("tiny")
     assert arrays is not None
     assert list(arrays) == list(DERIVED)
@@ -77,10 +82,7 @@ def sound(path: Path) -> bool:
         return True
     for position in range(POSITIONS):
         frames = folder.read(position)
-        if frames is not None and any(
-            one.dtype != other.dtype or not np.array_equal(one, other)
-            for one, other in zip(frames, pictures(position), strict=True)
-        ):
+        if frames is not None and not same(frames, pictures(position)):
             return False
     arrays = folder.load_derived("tiny")
     return arrays is None or all(np.array_equal(array, derived(number)) for number, array in enumerate(arrays.values()))
