@@ -4,7 +4,8 @@ from dataclasses import asdict, dataclass, fields
 from typing import Any, Final, get_args
 
 from hoz_dist.errors import InvalidValueError, UnknownNameError
-from hoz_dist.graph.planner import EdgeCost
+from hoz_dist.graph.checks import MAX_ZONES
+from hoz_dist.graph.planner import DEFAULT_EDGE_COST, EdgeCost
 from hoz_dist.nav.pose import PICTURE_SIZE
 from hoz_dist.policy.settings import EncoderName, Layer, Method, PolicySettings, Preset
 
@@ -34,7 +35,7 @@ class RunConfig:
     """Side of the camera's picture, pixels."""
     zones: int = 8
     """K, zones of a graph."""
-    edge_cost: EdgeCost = "normalized"
+    edge_cost: EdgeCost = DEFAULT_EDGE_COST
     seed: int = 0
     batch: int = 64
     """B, episodes that an actor runs at once."""
@@ -134,7 +135,7 @@ def _fits(name: str, value: object, default: object) -> bool:
 _RANGES: Final = (
     ("channels", 1, 4096),
     ("picture_size", 16, 512),
-    ("zones", 2, 64),
+    ("zones", 2, MAX_ZONES),
     ("seed", 0, 2**31 - 1),
     ("batch", 1, 4096),
     # After an episode's end comes a step that only resets, so of two steps one is valid.

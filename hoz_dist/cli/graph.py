@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from hoz_dist.cli.options import cache_option, echo_json
+from hoz_dist.cli.options import cache_option, echo_json, force_option
 from hoz_dist.graph.planner import DEFAULT_EDGE_COST, EDGE_COSTS, EdgeCost
 
 if TYPE_CHECKING:
@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from hoz_dist.sim.room_views import RoomViews
 
 _FILE = click.Path(path_type=Path)
-_force_option = click.option("--force", is_flag=True, help="Replace the output file if it exists. Default: refuse.")
 _scene_option = click.option(
     "--scene", metavar="NAME", help="Scene of a .mat file, which does not hold it. Default: guessed from its name."
 )
@@ -36,7 +35,7 @@ def graph_group() -> None:
 @click.option("--output", type=_FILE, metavar="FILE", help="File to write. Default: SCENE.json in this folder.")
 @click.option("--zones", type=int, default=8, show_default=True, help="K, the number of zones, 1 to 64.")
 @cache_option
-@_force_option
+@force_option
 def build_command(*, names: tuple[str, ...], output: Path | None, zones: int, cache: Path | None, force: bool) -> None:
     """Explore rooms of one scene and merge their graphs into a scene graph.
 
@@ -158,7 +157,7 @@ def plan_command(
 @click.argument("source", metavar="IN", type=_FILE)
 @click.argument("output", metavar="OUT", type=_FILE)
 @_scene_option
-@_force_option
+@force_option
 def convert_command(*, source: Path, output: Path, scene: str | None, force: bool) -> None:
     """Convert a scene graph between .json, .msgpack and .mat, to the last bit.
 
@@ -177,7 +176,7 @@ def convert_command(*, source: Path, output: Path, scene: str | None, force: boo
 @_top_option
 @_scene_option
 @cache_option
-@_force_option
+@force_option
 def plot_command(
     *, file: Path, output: Path | None, room: str | None, top: int, scene: str | None, cache: Path | None, force: bool
 ) -> None:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Final
 import click
 
 from hoz_dist.cli.connecting import connect_option, run_option
+from hoz_dist.cli.options import force_option
 from hoz_dist.errors import InvalidValueError
 
 if TYPE_CHECKING:
@@ -34,7 +35,7 @@ _TOP: Final = 5
     help="How to print it.  [default: by the extension of --output, else table]",
 )
 @click.option("--output", type=click.Path(path_type=Path), metavar="FILE", help="Write to a file instead of printing.")
-@click.option("--force", is_flag=True, help="Replace the output file if it exists.")
+@force_option
 def query_command(
     *,
     name: str,

@@ -35,6 +35,16 @@ def check_zone_graph(nodes: NDArray[np.float64], edges: NDArray[np.float64], cat
     Raises:
         InvalidValueError: Something is off; the message says what.
     """
+    check_shapes(nodes, edges, categories)
+    check_values(nodes, edges)
+
+
+def check_shapes(nodes: NDArray[np.float64], edges: NDArray[np.float64], categories: int) -> None:
+    """Check that nodes and edges are tables that fit together; see `check_zone_graph`.
+
+    Raises:
+        InvalidValueError: They do not.
+    """
     zones = len(edges) if edges.ndim else 0
     if not 1 <= zones <= MAX_ZONES or edges.shape != (zones, zones):
         message = f"Edges must be a square table of 1 to {MAX_ZONES} zones, not of shape {edges.shape}."
@@ -42,6 +52,14 @@ def check_zone_graph(nodes: NDArray[np.float64], edges: NDArray[np.float64], cat
     if nodes.shape != (zones, categories) or not 1 <= categories <= MAX_CATEGORIES:
         message = f"Nodes must be a table of {zones} zones by {categories} categories, not of shape {nodes.shape}."
         raise InvalidValueError(message)
+
+
+def check_values(nodes: NDArray[np.float64], edges: NDArray[np.float64]) -> None:
+    """Check the numbers in tables that `check_shapes` accepts; see `check_zone_graph`.
+
+    Raises:
+        InvalidValueError: One is out of its range.
+    """
     for name, values in (("Nodes", nodes), ("Edges", edges)):
         if not np.isfinite(values).all() or values.min() < 0 or values.max() > 1:
             message = f"{name} must be finite numbers from 0 to 1."

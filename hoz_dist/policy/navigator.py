@@ -6,12 +6,10 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
+from hoz_dist.graph.matching import ALPHA
 from hoz_dist.nav.categories import SCENES, TARGETS
 from hoz_dist.policy.graph_bank import GraphBank
 from hoz_dist.policy.layers import ZoneLayer
-
-ALPHA = 0.1
-"""alpha of Eq. 3."""
 
 
 class ZoneState(NamedTuple):

@@ -10,6 +10,8 @@ from typing import Annotated, Any, ClassVar, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from hoz_dist.errors import InvalidValueError
+from hoz_dist.graph.checks import MAX_ZONES, check_shapes, check_values
 from hoz_dist.nav.categories import SCENES, TARGETS
 from hoz_dist.nav.episode import EpisodeResult
 from hoz_dist.nav.rooms import RoomId
@@ -20,9 +22,7 @@ from hoz_dist.wire.schema import Counts, Int, JsonObject, Many, OneOf, Real, Rec
 
 MAX_PARAMETERS: Final = 30_000_000
 """Largest number of policy parameters; three times the paper's sizes, and within Zenoh's largest message."""
-MAX_ZONES: Final = 64
 MAX_EPISODES: Final = 4096
-_DIAGONAL_TOLERANCE: Final = 1e-6
 _SMALL: Final = 64 * 1024
 _GRAPH: Final = 1024 * 1024
 
@@ -346,11 +346,13 @@ class StatusReply(Message):
 
 def _check_graph(nodes: NDArray[np.float64], edges: NDArray[np.float64], categories: tuple[str, ...]) -> None:
     """Judge whether nodes [K, N], edges [K, K] and categories [N] belong together."""
-    zones, columns = nodes.shape
-    if zones > MAX_ZONES or columns != len(categories) or edges.shape != (zones, zones):
-        detail = f"nodes {nodes.shape}, edges {edges.shape} and {len(categories)} categories do not fit"
-        raise RejectedError(Reason.SHAPE, detail)
     if len(set(categories)) != len(categories):
         raise RejectedError(Reason.NAME, "a category occurs twice")
-    if np.abs(np.diagonal(edges) - 1.0).max() > _DIAGONAL_TOLERANCE:
-        raise RejectedError(Reason.RANGE, "the edges are not 1 on the diagonal")
+    try:
+        check_shapes(nodes, edges, len(categories))
+    except InvalidValueError as error:
+        raise RejectedError(Reason.SHAPE, str(error)) from error
+    try:
+        check_values(nodes, edges)
+    except InvalidValueError as error:
+        raise RejectedError(Reason.RANGE, str(error)) from error
