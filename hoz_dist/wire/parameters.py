@@ -18,6 +18,7 @@ from hoz_dist.wire.ask import Answer, ask
 from hoz_dist.wire.codec import decode, encode
 from hoz_dist.wire.keys import Keys
 from hoz_dist.wire.messages import ParametersHead, ParametersShard
+from hoz_dist.wire.outage import learner_outage
 from hoz_dist.wire.publishing import NewestPublisher, NewestSubscriber
 from hoz_dist.wire.queryable import declare_queryable
 from hoz_dist.wire.rejection import Reason, RejectedError
@@ -114,6 +115,7 @@ class ParametersFollower:
         self._keys = keys
         self._stop = stop
         self._fetched: Parameters | None = None
+        self._outage = learner_outage(_log)
         self._subscriber = NewestSubscriber(
             session, keys.params, ParametersHead, replaces=lambda known, new: new.stamp >= known.stamp
         )
@@ -126,18 +128,26 @@ class ParametersFollower:
     def fetch(self, at_least: tuple[int, int] | None = None, timeout_s: float | None = None) -> Parameters:
         """Return the newest parameters.
 
+        Those that were fetched last are returned without asking when they suffice and no newer ones were heard of.
+
         Args:
-            at_least: Epoch and version that they must have reached; None for what was fetched last.
+            at_least: Epoch and version that they must have reached; None to ask for the newest in any case.
             timeout_s: When to give up, seconds from now; None for never.
 
         Raises:
             StoppedError: The stop event was set.
             ConnectionFailedError: The learner did not serve them in time.
         """
+        if at_least is not None and self._fetched is not None and self._is_newest(self._fetched, at_least):
+            return self._fetched
         wanted = max(at_least or (0, 0), self._fetched.head.stamp if self._fetched else (0, 0))
         deadline, backoff = Deadline(timeout_s), Backoff(self._stop)
         while True:
             answers = ask(self._session, self._keys.shards, timeout_s=deadline.within(_ATTEMPT_S), stop=self._stop)
+            if answers:
+                self._outage.worked()
+            else:
+                self._outage.failed()
             try:
                 fetched = assemble(answers)
             except RejectedError as error:
@@ -152,6 +162,10 @@ class ParametersFollower:
                 )
                 raise ConnectionFailedError(message)
             backoff.pause(deadline)
+
+    def _is_newest(self, fetched: Parameters, at_least: tuple[int, int]) -> bool:
+        """Tell whether parameters that were fetched suffice, and are the last that were heard of."""
+        return self.newest is not None and self.newest.stamp == fetched.head.stamp >= at_least
 
     def close(self) -> None:
         """Stop following."""

@@ -12,6 +12,7 @@ from hoz_dist.errors import ConnectionFailedError
 from hoz_dist.wire.ask import ask
 from hoz_dist.wire.codec import checksum, decode, encode
 from hoz_dist.wire.messages import Accepted, Busy, Push, PushReply, Refused
+from hoz_dist.wire.outage import learner_outage
 from hoz_dist.wire.rejection import Reason, RejectedError
 from hoz_dist.wire.session import Session
 from hoz_dist.wire.waiting import Backoff, Deadline
@@ -34,6 +35,7 @@ class Pusher:
         self._session = session
         self._stop = stop
         self._attempt_s = attempt_s
+        self._outage = learner_outage(_log)
 
     def push(self, key: str, message: Push, deadline_s: float | None = None) -> Accepted | Refused:
         """Send a message until it is acknowledged.
@@ -66,8 +68,9 @@ class Pusher:
         """Send once; None when there is no answer."""
         answers = ask(self._session, key, timeout_s=timeout_s, stop=self._stop, payload=payload, attachment=attachment)
         if not answers:
-            _log.debug("no answer to a push on %s; trying again", key)
+            self._outage.failed()
             return None
+        self._outage.worked()
         try:
             reply = decode(answers[0].payload, Accepted, Busy, Refused)
         except RejectedError as error:

@@ -5,7 +5,7 @@ lets messages wait. Pushes are checked and then wait in one bounded queue for th
 spot from snapshots. Whatever is wrong with a message, the thread lives on and the sender gets one answer.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from types import TracebackType
 from typing import Self
 
@@ -33,22 +33,33 @@ class Server:
         session: Session of the learner.
         keys: Keys of the run.
         snapshots: What questions are answered from.
-        inbox: Where pushes wait; the learner takes them out and answers them.
+        rejections: Where to count rejections.
+        graphs: Graphs to serve from the first question on.
 
     Attributes:
         session: The session.
-        inbox: The inbox.
+        inbox: Where pushes wait; the learner takes them out and answers them.
         rejections: What was rejected so far, by the wire and by the learner.
         snapshots: The snapshots.
     """
 
-    def __init__(self, session: Session, keys: Keys, snapshots: Snapshots, inbox: Inbox | None = None) -> None:
-        self.inbox = inbox or Inbox()
-        self.rejections = Rejections()
+    def __init__(
+        self,
+        session: Session,
+        keys: Keys,
+        snapshots: Snapshots,
+        *,
+        rejections: Rejections | None = None,
+        graphs: Iterable[SceneGraph | RoomGraph] = (),
+    ) -> None:
+        self.inbox = Inbox()
+        self.rejections = rejections or Rejections()
         self.snapshots = snapshots
         self.session = session
         self._keys = keys
         self._publishers: dict[str, NewestPublisher] = {}
+        for graph in graphs:
+            self.put_graph(graph)
         handlers: dict[str, Callable[[Query], None]] = {
             keys.all_grads: lambda query: self._receive(query, GradientPush),
             keys.all_rollouts: lambda query: self._receive(query, EpisodesPush),
@@ -94,7 +105,9 @@ class Server:
         try:
             message = self._checked(key, payload, query.attachment, expected)
         except RejectedError as error:
-            self.rejections.count(error.reason, error.detail, sender=key.rpartition("/")[2])
+            # The last part of the key is the actor's name, but of a room's it is a number.
+            sender = key if expected is RoomGraphPush else key.rpartition("/")[2]
+            self.rejections.count(error.reason, error.detail, sender)
             answer(query, key, Refused(error.reason.value, error.detail[:2048]))
             return
         request = Request(query, message, len(payload), self.rejections)

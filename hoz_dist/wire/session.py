@@ -5,6 +5,8 @@ declares everything again by itself), retries from 200 ms to 2 s (the default ta
 """
 
 import json
+import re
+import threading
 from typing import Any, Final
 
 import zenoh
@@ -12,11 +14,14 @@ from zenoh import Session
 
 from hoz_dist.errors import ConnectionFailedError
 from hoz_dist.wire.endpoint import check_endpoint
+from hoz_dist.wire.waiting import Deadline, StoppedError
 
 __all__ = ["Session", "open_client", "open_router"]
 
 CONNECT_TIMEOUT_S: Final = 2.0
 """How long opening waits for a router by default; it tries again and again within this time."""
+_ATTEMPT_S: Final = 2.0
+"""How long Zenoh tries without a look at the stop event."""
 _COMMON: Final[dict[str, Any]] = {
     "scouting/multicast/enabled": False,
     "scouting/gossip/enabled": False,
@@ -39,7 +44,7 @@ def open_router(listen: str) -> Session:
 
     Raises:
         InvalidValueError: The endpoint is malformed.
-        ConnectionFailedError: The endpoint is in use or does not belong to this machine.
+        ConnectionFailedError: The endpoint is in use, does not belong to this machine, or cannot be listened at.
     """
     settings = {
         "mode": "router",
@@ -50,38 +55,63 @@ def open_router(listen: str) -> Session:
     try:
         return zenoh.open(_config(settings))
     except zenoh.ZError as error:
-        reason = "it is in use" if "in use" in str(error) else "the address does not belong to this machine"
-        message = f"Cannot listen at {listen}: {reason}; choose another endpoint with --listen."
+        message = f"Cannot listen at {listen}: {_reason(error)}; choose another endpoint with --listen."
         raise ConnectionFailedError(message) from error
 
 
-def open_client(connect: str, timeout_s: float = CONNECT_TIMEOUT_S) -> Session:
+def open_client(connect: str, timeout_s: float = CONNECT_TIMEOUT_S, stop: threading.Event | None = None) -> Session:
     """Open a session as a client of a router. Use it in a ``with`` statement.
 
     Once open it survives the router: it reconnects by itself.
 
     Args:
         connect: Endpoint of the router or of a learner.
-        timeout_s: How long to wait for the router, seconds.
+        timeout_s: How long to wait for the router, seconds; it is tried again and again meanwhile.
+        stop: Ends the wait early.
 
     Raises:
         InvalidValueError: The endpoint is malformed.
         ConnectionFailedError: No router answers in time.
+        StoppedError: The stop event was set.
     """
+    endpoint, deadline = check_endpoint(connect), Deadline(timeout_s)
+    while True:
+        attempt_ms = max(round(deadline.within(_ATTEMPT_S) * 1000), 1)
+        try:
+            return _open_client(endpoint, attempt_ms)
+        except zenoh.ZError as error:
+            if stop is not None and stop.is_set():
+                raise StoppedError from error
+            if deadline.passed:
+                message = (
+                    f"No learner or router answers at {connect}; "
+                    "start one with `hoz-dist learner --listen ...` or check the address."
+                )
+                raise ConnectionFailedError(message) from error
+
+
+def _open_client(endpoint: str, timeout_ms: int) -> Session:
+    """Open a client's session; Zenoh cannot be told to stop meanwhile, and is not interrupted by signals."""
     settings = {
         "mode": "client",
-        "connect/endpoints": [check_endpoint(connect)],
-        "connect/timeout_ms": round(timeout_s * 1000),
+        "connect/endpoints": [endpoint],
+        "connect/timeout_ms": timeout_ms,
         "connect/retry": _RETRY,
     }
-    try:
-        return zenoh.open(_config(settings))
-    except zenoh.ZError as error:
-        message = (
-            f"No learner or router answers at {connect}; "
-            "start one with `hoz-dist learner --listen ...` or check the address."
-        )
-        raise ConnectionFailedError(message) from error
+    return zenoh.open(_config(settings))
+
+
+def _reason(error: zenoh.ZError) -> str:
+    """Say why an endpoint cannot be listened at."""
+    text = str(error)
+    if "in use" in text:
+        return "it is in use"
+    if "Cannot assign requested address" in text:
+        return "the address does not belong to this machine"
+    # Zenoh's own words, less the places in its source code; the innermost cause stands in brackets.
+    words = re.sub(r" at \S+\.rs:\d+\.?", "", text)
+    cause = re.search(r": \[(.*)\]$", words)
+    return (cause[1] if cause else words).rstrip(". ")
 
 
 def _config(settings: dict[str, Any]) -> zenoh.Config:

@@ -21,14 +21,17 @@ from hoz_dist.errors import ConnectionFailedError, HozError, InvalidValueError, 
 from hoz_dist.graph.files import load_graph
 from hoz_dist.graph.planner import plan_for
 from hoz_dist.nav.categories import TARGETS
+from hoz_dist.wire.discovery import find_run
 from hoz_dist.wire.keys import Keys
 from hoz_dist.wire.queryable import declare_queryable
 from hoz_dist.wire.server import Server
 from hoz_dist.wire.session import open_client, open_router
 from hoz_dist.wire.snapshots import Snapshots
+from hoz_dist.wire.waiting import StoppedError
 from tests import wire_samples as samples
 
 pytestmark = pytest.mark.integration
+KEYS = samples.KEYS
 PLAN = plan_for(samples.scene_graph(), "Microwave", ["Sink", "Toaster"], "product")
 
 
@@ -159,9 +162,46 @@ def test_a_learner_of_another_protocol_version_is_named(endpoint: str) -> None:
                 query.reply(key, strange)
 
         queryable = declare_queryable(session, key, answer)
-        with HozClient(endpoint) as client, pytest.raises(HozError, match="protocol version 9; this side speaks 1"):
-            client.status()
+        with HozClient(endpoint) as client:
+            with pytest.raises(HozError, match="protocol version 9; this side speaks 1"):
+                client.status()
+            # A learner of our own version is found all the same.
+            with Server(session, KEYS, Snapshots(samples.config_reply(), samples.status_reply, "product")):
+                assert client.runs() == [KEYS.run]
+                assert client.status()["version"] == 5
+            with HozClient(endpoint, run="next") as named, pytest.raises(HozError, match="protocol version 9"):
+                named.status()
         queryable.close()
+
+
+def test_two_learners_of_one_run_are_said_to_be_two(learner: Server, endpoint: str) -> None:
+    snapshots = Snapshots(samples.config_reply(), samples.status_reply, "product")
+    with open_client(endpoint) as second, Server(second, KEYS, snapshots):
+        for run in (None, KEYS.run):
+            with (
+                HozClient(endpoint, run=run) as client,
+                pytest.raises(InvalidValueError, match="2 learners serve a run named 'run-1'"),
+            ):
+                client.status()
+
+
+def test_a_run_is_looked_for_until_its_learner_answers(endpoint: str) -> None:
+    found = []
+    with open_router(endpoint) as session, open_client(endpoint) as client:
+        looking = threading.Thread(target=lambda: found.append(find_run(client, KEYS.run, timeout_s=20.0)))
+        looking.start()
+        with pytest.raises(NotFoundError, match="hoz-dist learner --listen"):
+            find_run(client, None, timeout_s=0.3)
+        with Server(session, KEYS, Snapshots(samples.config_reply(), samples.status_reply, "product")):
+            looking.join(20.0)
+    assert [config.run for config in found] == [KEYS.run]
+
+
+def test_a_stopped_process_does_not_look_for_a_run(endpoint: str) -> None:
+    stop = threading.Event()
+    stop.set()
+    with open_router(endpoint), open_client(endpoint) as client, pytest.raises(StoppedError):
+        find_run(client, None, timeout_s=60.0, stop=stop)
 
 
 # --- the commands ---

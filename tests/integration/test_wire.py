@@ -33,6 +33,7 @@ from hoz_dist.wire.push import Pusher
 from hoz_dist.wire.rejection import Reason
 from hoz_dist.wire.server import Server
 from hoz_dist.wire.session import Session, open_client, open_router
+from hoz_dist.wire.snapshots import Snapshots
 from hoz_dist.wire.waiting import StoppedError
 from tests import wire_samples as samples
 
@@ -119,6 +120,32 @@ def test_a_port_in_use_is_said_in_one_sentence(learner: Server, endpoint: str) -
 def test_an_address_of_another_machine_is_said_in_one_sentence() -> None:
     with pytest.raises(ConnectionFailedError, match="does not belong to this machine"):
         open_router("tcp/192.0.2.1:7447")
+
+
+def test_another_failure_to_listen_is_said_in_zenohs_own_words() -> None:
+    with pytest.raises(ConnectionFailedError) as caught:
+        open_router("tcp/no-such-host.invalid:7447")
+    assert "failed to lookup address information" in str(caught.value)
+    assert ".rs" not in str(caught.value)
+
+
+def test_a_client_waits_for_a_router_for_as_long_as_it_was_told(endpoint: str) -> None:
+    opened = []
+    waiting = threading.Thread(target=lambda: opened.append(open_client(endpoint, timeout_s=WAIT_S)))
+    waiting.start()
+    with pytest.raises(ConnectionFailedError):
+        open_client(endpoint, timeout_s=2.5)
+    with samples.serving(endpoint):
+        waiting.join(WAIT_S)
+        with opened[0] as session:
+            assert not session.is_closed()
+
+
+def test_a_stopped_process_does_not_wait_for_a_router(endpoint: str) -> None:
+    stop = threading.Event()
+    stop.set()
+    with pytest.raises(StoppedError):
+        open_client(endpoint, timeout_s=60.0, stop=stop)
 
 
 def test_a_malformed_endpoint_is_said_in_one_sentence() -> None:
@@ -294,6 +321,12 @@ def test_a_bad_push_gets_one_answer_with_its_reason_and_is_counted(
     assert learner.inbox.take(0) is None
 
 
+def test_a_bad_push_of_a_room_is_counted_by_its_whole_key(learner: Server, client: Session) -> None:
+    key = KEYS.room(samples.ROOM)
+    _raw_push(client, key, b"")
+    assert learner.rejections.by_sender() == {key: 1}
+
+
 def test_a_push_damaged_on_the_way_is_sent_again(learner: Server, client: Session, endpoint: str) -> None:
     # A relay that damages the first message stands in for the network.
     relay_keys = "relay/grads"
@@ -418,7 +451,55 @@ def test_tokens_with_strange_names_are_ignored(endpoint: str) -> None:
             assert until(lambda: members.current() == (("actor", "a0"),))
 
 
+def test_a_learner_that_is_away_is_said_once_and_so_is_its_return(
+    endpoint: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level("INFO", "hoz_dist.wire")
+    with open_router(endpoint) as session, open_client(endpoint) as client:
+        pusher = Pusher(client, threading.Event())
+        follower = ParametersFollower(client, KEYS, threading.Event())
+        with pytest.raises(ConnectionFailedError):
+            pusher.push(GRADS, samples.gradient_push(), deadline_s=0.5)
+        with pytest.raises(ConnectionFailedError):
+            follower.fetch(timeout_s=0.5)
+        away = "the learner does not answer; trying again"
+        assert [record.getMessage() for record in caplog.records] == [away, away]
+        caplog.clear()
+        snapshots = Snapshots(samples.config_reply(), samples.status_reply, "product")
+        with Server(session, KEYS, snapshots) as server, ParametersPublisher(session, KEYS) as publisher, follower:
+            publisher.publish(1, 0, np.zeros(3, np.float32))
+            with answering(server.inbox, lambda _: Accepted(1, 1)):
+                for sequence in range(2):
+                    pusher.push(GRADS, samples.gradient_push(sequence), deadline_s=WAIT_S)
+                    follower.fetch(timeout_s=WAIT_S)
+        assert [record.getMessage() for record in caplog.records if "learner" in record.getMessage()] == [
+            "the learner answers again"
+        ] * 2
+
+
 # --- parameters and graphs ---
+
+
+def test_graphs_are_served_from_the_first_question_on(endpoint: str) -> None:
+    snapshots = Snapshots(samples.config_reply(), samples.status_reply, "product")
+    with open_router(endpoint) as session, Server(session, KEYS, snapshots, graphs=[samples.scene_graph()]):
+        assert set(snapshots.graphs) == {"kitchen"}
+        with open_client(endpoint) as client:
+            (answer,) = ask(client, KEYS.graph("kitchen"), timeout_s=5.0)
+            assert decode(answer.payload, SceneGraphReply).version == 2
+
+
+def test_parameters_that_suffice_and_are_the_newest_are_not_fetched_again(learner: Server, client: Session) -> None:
+    with ParametersFollower(client, KEYS, threading.Event()) as follower:
+        with ParametersPublisher(learner.session, KEYS) as publisher:
+            publisher.publish(1, 4, np.ones(3, np.float32))
+            fetched = follower.fetch(timeout_s=WAIT_S)
+            assert until(lambda: follower.newest is not None)
+        # Nobody serves them any more.
+        assert follower.fetch((1, 4), timeout_s=0.2) is fetched
+        for at_least in (None, (1, 5)):
+            with pytest.raises(ConnectionFailedError):
+                follower.fetch(at_least, timeout_s=0.2)
 
 
 def test_a_follower_gets_the_newest_parameters(learner: Server, client: Session, endpoint: str) -> None:
