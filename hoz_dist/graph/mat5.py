@@ -1,7 +1,7 @@
 """A reader of MATLAB 5 files for tables of real doubles, which is all that released graphs are made of.
 
 SciPy's reader crashes the process on damaged files (about 1 in 60 with a few random bytes changed, SciPy 1.17) and
-unpacks whatever they say they hold. This one reads every length before it trusts it.
+unpacks whatever they say they hold. This one reads every length before it trusts it, and unpacks little.
 
 The format: a header of 128 bytes, then elements. An element is a tag (type and number of bytes) and data padded to 8
 bytes; a small one has tag and data in 8 bytes. A variable is an element of elements: flags, shape, name, numbers; it
@@ -10,7 +10,7 @@ may be packed by zlib.
 
 import struct
 import zlib
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
 from typing import Final
 
 import numpy as np
@@ -31,32 +31,43 @@ _FRACTIONS: Final = frozenset({7, 9})
 _DOUBLE_CLASS: Final = 6
 _COMPLEX_FLAG: Final = 0x800
 _MAX_UNPACKED: Final = 4 * 1024 * 1024
-"""Most bytes of a packed variable."""
+"""Most bytes of all packed variables of a file: no file is read that is larger, packed or not."""
 
 
-def read_mat5(content: bytes) -> dict[str, NDArray[np.float64]]:
-    """Read the tables of real doubles in a MATLAB 5 file and pass over everything else.
+def read_mat5(content: bytes, names: Container[str]) -> dict[str, NDArray[np.float64]]:
+    """Read tables of real doubles in a MATLAB 5 file and pass over everything else.
 
     Args:
         content: Of the file.
+        names: Of the tables to read.
 
     Returns:
-        Tables by name, float64 [rows, columns].
+        Those that there are, by name, float64 [rows, columns].
 
     Raises:
-        InvalidValueError: It is not a MATLAB 5 file, or it is damaged.
+        InvalidValueError: It is not a MATLAB 5 file, it is damaged, or it unpacks to more than a graph can need.
     """
     if content[_HEADER_BYTES - len(_HEADER_END) : _HEADER_BYTES] != _HEADER_END:
         message = "It is not a MATLAB 5 file."
         raise InvalidValueError(message)
     tables = {}
-    for kind, data in _elements(content[_HEADER_BYTES:]):
-        variables = _elements(_unpacked(data)) if kind == _PACKED else iter([(kind, data)])
-        for variable_kind, variable in variables:
-            named = _table(variable) if variable_kind == _MATRIX else None
-            if named is not None:
-                tables[named[0]] = named[1]
+    for kind, variable in _variables(content[_HEADER_BYTES:]):
+        named = _table(variable) if kind == _MATRIX else None
+        if named is not None and named[0] in names:
+            tables[named[0]] = named[1]
     return tables
+
+
+def _variables(content: bytes) -> Iterator[tuple[int, bytes]]:
+    """Yield type and data of each variable, unpacked."""
+    left = _MAX_UNPACKED
+    for kind, data in _elements(content):
+        if kind == _PACKED:
+            unpacked = _unpacked(data, left)
+            left -= len(unpacked)
+            yield from _elements(unpacked)
+        else:
+            yield kind, data
 
 
 def _elements(content: bytes) -> Iterator[tuple[int, bytes]]:
@@ -80,13 +91,16 @@ def _elements(content: bytes) -> Iterator[tuple[int, bytes]]:
         yield kind, content[begin:end]
 
 
-def _unpacked(data: bytes) -> bytes:
-    """Unpack a variable."""
+def _unpacked(data: bytes, most: int) -> bytes:
+    """Unpack a variable of at most ``most`` bytes."""
     unpacker = zlib.decompressobj()
     try:
-        unpacked = unpacker.decompress(data, _MAX_UNPACKED)
+        unpacked = unpacker.decompress(data, most + 1)  # a limit of 0 would mean none
     except zlib.error as error:
         raise _damaged() from error
+    if len(unpacked) > most:
+        message = f"It unpacks to more than {_MAX_UNPACKED // 1024**2} MiB, which no graph needs."
+        raise InvalidValueError(message)
     if not unpacker.eof:
         raise _damaged()
     return unpacked

@@ -42,7 +42,7 @@ def from_matlab(content: bytes, scene: str) -> SceneGraph:
     Raises:
         InvalidValueError: The content is not that of a scene graph; the message says what is wrong.
     """
-    tables = read_mat5(content)
+    tables = read_mat5(content, _TABLES)
     if not all(name in tables for name in _TABLES):
         message = "It must hold the tables 'node_features' and 'edges' of real doubles."
         raise InvalidValueError(message)
