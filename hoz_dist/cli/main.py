@@ -4,6 +4,7 @@ A sub-command's module is imported only when that command runs, so that `hoz-dis
 """
 
 import os
+import signal
 import sys
 from importlib import import_module
 from typing import Final, NamedTuple
@@ -92,8 +93,10 @@ def main() -> None:
     """Run the command line and exit.
 
     Exit status: 0 on success, 1 when a check found something wrong, 2 for an error of the user's, said in one sentence
-    on standard error, 130 when interrupted.
+    on standard error, 130 when interrupted, by SIGTERM too: it ends a command as Ctrl-C does, by way of the `with`
+    statements that stop its children.
     """
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     sys.exit(run(sys.argv[1:]))
 
 
@@ -119,8 +122,6 @@ def run(arguments: list[str]) -> int:
         error.show()
         return EXIT_USER_ERROR
     except (click.ClickException, HozError, OSError) as error:
-        if isinstance(error, OSError) and error.filename is None:
-            raise
         click.echo(f"hoz-dist: {_sentence_of(error)}", err=True)
         return EXIT_USER_ERROR
     return result if isinstance(result, int) else 0
@@ -134,6 +135,8 @@ def _sentence_of(error: click.ClickException | HozError | OSError) -> str:
             sentence = f"{error.format_message()} See '{command} --help'."
         case click.ClickException():
             sentence = error.format_message()
+        case OSError(filename=None):
+            sentence = f"The system refuses: {error.strerror or error}."
         case OSError():
             sentence = f"'{error.filename}': {error.strerror}."
         case _:

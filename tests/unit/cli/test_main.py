@@ -105,6 +105,8 @@ def test_a_bare_command_shows_its_help(capsys: pytest.CaptureFixture[str]) -> No
             2,
             "hoz-dist: '/nowhere/out.png': Permission denied.\n",
         ),
+        (OSError(28, "No space left on device"), 2, "hoz-dist: The system refuses: No space left on device.\n"),
+        (OSError("cannot write it"), 2, "hoz-dist: The system refuses: cannot write it.\n"),
     ],
 )
 def test_interruption_and_files_that_cannot_be_used(
