@@ -8,6 +8,7 @@ from typing import Final
 import click
 from rich.console import Console
 
+from hoz_dist.atomic import replace_file, write_atomically
 from hoz_dist.cli.measure import Measurement, measure
 from hoz_dist.cli.progress import duration
 from hoz_dist.evaluation.table import comparison_table
@@ -45,7 +46,7 @@ def report(run: Path, *, episodes: int, seed: int, weights: Path | None, cache: 
         measurement = measure(checkpoint, split="val", seeds=[seed], episodes=episodes, weights=weights, cache=cache)
         console.print(comparison_table(measurement.comparison))
         results = json.dumps(measurement.comparison.to_json(), indent=2)
-        (run / RESULTS_FILE).write_text(results + "\n", encoding="utf-8")
+        write_atomically(run / RESULTS_FILE, f"{results}\n".encode(), overwrite=True)
         pictures.append(_draw_trajectories(measurement, run / TRAJECTORIES_FILE, seed))
     click.echo("Pictures: " + ", ".join(map(str, pictures)))
     click.echo("Try next:")
@@ -59,7 +60,7 @@ def _draw_graphs(checkpoint: Checkpoint, run: Path) -> list[Path]:
     pictures = []
     for scene, graph in checkpoint.scene_graphs().items():
         path = run / f"zones-{scene}.png"
-        path.write_bytes(png(scene_graph_figure(graph)))
+        write_atomically(path, png(scene_graph_figure(graph)), overwrite=True)
         pictures.append(path)
     return pictures
 
@@ -74,13 +75,11 @@ def _draw_trajectories(measurement: Measurement, path: Path, seed: int) -> Path:
         chosen += dict.fromkeys((by_length[-1], by_length[len(by_length) // 2]))
     results, ways = trace_episodes(measurement.agent, benchmark.rooms, chosen, seed)
     graphs = {views.room: views.graph for views in benchmark.rooms}
-    draw_trajectories(
-        [
-            Trajectory(load_room(result.room), graphs[result.room], way, result, measurement.agent.name)
-            for result, way in zip(results, ways, strict=True)
-        ],
-        path,
-    )
+    trajectories = [
+        Trajectory(load_room(result.room), graphs[result.room], way, result, measurement.agent.name)
+        for result, way in zip(results, ways, strict=True)
+    ]
+    replace_file(path, lambda temporary: draw_trajectories(trajectories, temporary))
     return path
 
 

@@ -38,7 +38,7 @@ def draw_trajectories(trajectories: Sequence[Trajectory], path: Path) -> None:
 
     Args:
         trajectories: At least one.
-        path: File to write; its folder is made if need be.
+        path: File to write, whatever its extension; its folder is made if need be.
     """
     columns = min(4, len(trajectories))
     rows = -(-len(trajectories) // columns)
@@ -54,7 +54,7 @@ def draw_trajectories(trajectories: Sequence[Trajectory], path: Path) -> None:
         fontsize=9,
     )
     path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path, dpi=110)
+    figure.savefig(path, format="png", dpi=110)
 
 
 def _draw(axis: Axes, trajectory: Trajectory) -> None:

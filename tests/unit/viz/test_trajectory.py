@@ -21,11 +21,11 @@ def trajectory(*, success: bool) -> Trajectory:
 
 
 def test_every_trajectory_is_drawn_and_success_shows(tmp_path: Path) -> None:
-    found, missed, both = (tmp_path / "new" / name for name in ("found.png", "missed.png", "both.png"))
+    found, missed, both = (tmp_path / "new" / name for name in ("found.png", "missed.png", "both.tmp"))
     draw_trajectories([trajectory(success=True)], found)
     draw_trajectories([trajectory(success=False)], missed)
     draw_trajectories([trajectory(success=True), trajectory(success=False)], both)
-    one, other, wide = (imread(path) for path in (found, missed, both))
+    one, other, wide = (imread(path, format="png") for path in (found, missed, both))
     assert one.shape == other.shape
     assert (one != other).any()
     assert wide.shape[1] > 1.5 * one.shape[1]
