@@ -71,7 +71,7 @@ def status_reply() -> StatusReply:
 HEAD = ParametersHead(epoch=1, version=5, digest="0123456789abcdef", size=100, shards=1)
 MESSAGES: tuple[Message, ...] = (
     gradient_push(),
-    EpisodesPush("a0", 77, 3, frames=400, frames_per_second=99.5, lag=0.25, episodes=(EPISODE, EPISODE)),
+    EpisodesPush("a0", 77, 3, episodes=(EPISODE, EPISODE), policy_loss=-0.5, entropy=1.75),
     RoomGraphPush("a0", 77, 0, ROOM, "d1", TARGETS, *zone_graph()),
     Accepted(1, 5),
     Busy(),

@@ -90,27 +90,27 @@ class EpisodesPush(Push):
     """Finished episodes and how the actor gets on.
 
     Attributes:
-        frames: Environment steps since the actor's last push of episodes.
-        frames_per_second: Its speed since then.
-        lag: Mean policy lag of its gradients since then, in parameter versions.
         episodes: Results, in the order in which the episodes ended.
         policy_loss: Mean policy loss of its gradients since then.
         value_loss: Mean value loss, likewise.
         entropy: Mean entropy of the policy, nats, likewise.
         scene_loss: Mean cross-entropy of the scene layer, nats, likewise; 0 without the layer.
+        frames: Not read; the learner counts the frames of gradients.
+        frames_per_second: Not read; the learner measures the speed.
+        lag: Not read; the learner measures the policy lag.
     """
 
     KIND: ClassVar[str] = "episodes"
     MOST_BYTES: ClassVar[int] = 128 * MAX_EPISODES + _SMALL
 
-    frames: Annotated[int, Int()]
-    frames_per_second: Annotated[float, Real(0.0)]
-    lag: Annotated[float, Real(0.0)]
     episodes: Annotated[tuple[EpisodeResult, ...], _EPISODES]
     policy_loss: Annotated[float, Real()] = 0.0
     value_loss: Annotated[float, Real()] = 0.0
     entropy: Annotated[float, Real()] = 0.0
     scene_loss: Annotated[float, Real()] = 0.0
+    frames: Annotated[int, Int()] = 0
+    frames_per_second: Annotated[float, Real(0.0)] = 0.0
+    lag: Annotated[float, Real(0.0)] = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -308,8 +308,8 @@ class ProcessStatus(Structure):
         id: Its name.
         rooms: Rooms that it trains in, as far as the learner knows.
         frames: Environment steps that it has contributed.
-        frames_per_second: Its speed, as it last said.
-        lag: Mean policy lag of its gradients, as it last said.
+        frames_per_second: Its speed, as the learner measures it.
+        lag: Mean policy lag of its recent gradients, as the learner measures it.
         rejected: Number of its messages that were rejected.
     """
 

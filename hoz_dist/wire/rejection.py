@@ -38,8 +38,6 @@ class Reason(StrEnum):
     """The message belongs to another epoch of the learner."""
     STALE = "stale"
     """The gradient was computed on parameters that are too old, or on a version that never was."""
-    NORM = "norm"
-    """The gradient's norm is out of bounds."""
     DIGEST = "digest"
     """The room is not the one that its digest says."""
     SPLIT = "split"

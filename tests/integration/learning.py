@@ -68,7 +68,7 @@ class FakeActor:
 
     def episodes(self, sequence: int, *outcomes: tuple[str, bool]) -> Answer:
         results = tuple(EpisodeResult(RoomId.parse(room), 0, success, 9, 4, True, 5) for room, success in outcomes)
-        push = EpisodesPush(self.name, self.incarnation, sequence, 100, 50.0, 0.0, results)
+        push = EpisodesPush(self.name, self.incarnation, sequence, episodes=results)
         return self._pusher.push(self._keys.rollouts(self.name), push, DEADLINE_S)
 
     def room_graph(self, sequence: int, graph: RoomGraph) -> Answer:

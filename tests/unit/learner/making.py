@@ -47,9 +47,7 @@ def gradient(
 
 def episodes(sequence: int, *outcomes: tuple[str, bool]) -> EpisodesPush:
     results = tuple(EpisodeResult(RoomId.parse(room), 0, success, 12, 6, True, 8) for room, success in outcomes)
-    return EpisodesPush(
-        actor="a", incarnation=1, sequence=sequence, frames=100, frames_per_second=50.0, lag=0.0, episodes=results
-    )
+    return EpisodesPush(actor="a", incarnation=1, sequence=sequence, episodes=results)
 
 
 def room_graph(room: str, seed: int = 0, *, digest: str = "d0", zones: int = ZONES) -> RoomGraph:

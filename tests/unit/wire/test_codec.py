@@ -80,8 +80,8 @@ def test_decoding_a_gradient_does_not_copy_it_again() -> None:
 
 
 def test_languages_with_one_type_of_number_may_send_whole_numbers() -> None:
-    data = altered(samples.MESSAGES[1], frames_per_second=120)
-    assert decode(data, EpisodesPush).frames_per_second == 120.0
+    data = altered(samples.MESSAGES[1], value_loss=120)
+    assert decode(data, EpisodesPush).value_loss == 120.0
 
 
 PUSH = samples.gradient_push()

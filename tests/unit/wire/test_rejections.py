@@ -20,10 +20,10 @@ def test_a_flood_is_logged_once_for_each_sender_and_reason(caplog: pytest.LogCap
     with caplog.at_level(logging.WARNING):
         for _ in range(100):
             rejections.count(Reason.STALE, "old", "a0")
-        rejections.count(Reason.NORM, "large", "a0")
+        rejections.count(Reason.SHAPE, "large", "a0")
     assert [record.getMessage() for record in caplog.records] == [
         "rejected a message of a0 (stale): old; 1 of this sender so far",
-        "rejected a message of a0 (norm): large; 101 of this sender so far",
+        "rejected a message of a0 (shape): large; 101 of this sender so far",
     ]
 
 
