@@ -20,7 +20,7 @@ from safetensors.numpy import save_file
 
 from hoz_dist.atomic import remove_left_overs, replace_file
 from hoz_dist.config import RunConfig
-from hoz_dist.errors import DamagedFileError, HozError, InvalidValueError, NotFoundError
+from hoz_dist.errors import DamagedFileError, InvalidValueError, NotFoundError
 from hoz_dist.graph.room_graph import RoomGraph
 from hoz_dist.graph.scene_graph import SceneGraph, merge_rooms
 from learner.optimizer import AdamState, Vector
@@ -113,20 +113,33 @@ def load_checkpoint(path: Path) -> Checkpoint:
     if not path.is_dir():
         return _load_file(path)
     folder = path / FOLDER if (path / FOLDER).is_dir() else path
+    checkpoint, damaged = newest_readable(folder)
+    for failure in damaged.values():
+        _log.warning("%s", failure)
+    return checkpoint
+
+
+def newest_readable(folder: Path) -> tuple[Checkpoint, dict[Path, DamagedFileError]]:
+    """Read the newest checkpoint of a folder that is not damaged.
+
+    Returns:
+        The checkpoint; and the newer ones that are damaged, with what is wrong with each.
+
+    Raises:
+        NotFoundError: There is no checkpoint in the folder.
+        DamagedFileError: Every checkpoint is damaged or something else.
+        InvalidValueError: The newest that is not damaged is of another version of the format.
+    """
     files = checkpoint_files(folder)
     if not files:
-        message = f"There is no checkpoint in '{path}'; give a checkpoint file or the folder of a run that saved one."
+        message = f"There is no checkpoint in '{folder}'; give a checkpoint file or the folder of a run that saved one."
         raise NotFoundError(message)
-    failures: list[HozError] = []
+    damaged: dict[Path, DamagedFileError] = {}
     for file in files:
         try:
-            checkpoint = _load_file(file)
-        except HozError as error:
-            failures.append(error)
-        else:
-            for failure in failures:
-                _log.warning("%s", failure)
-            return checkpoint
+            return _load_file(file), damaged
+        except DamagedFileError as error:
+            damaged[file] = error
     message = f"None of the {len(files)} checkpoints in '{folder}' can be read; the newest is '{files[0].name}'."
     raise DamagedFileError(message)
 

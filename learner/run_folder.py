@@ -1,6 +1,8 @@
 """A run's folder: its configuration, checkpoints, logs, and the lock that keeps a second learner out."""
 
 import json
+import logging
+import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -12,12 +14,17 @@ from filelock import FileLock, Timeout
 from hoz_dist.atomic import TEMPORARY_SUFFIX, replace_file
 from hoz_dist.config import RunConfig
 from hoz_dist.errors import DamagedFileError, HozError, InvalidValueError, NotFoundError, RunMismatchError
-from learner.checkpoint import FOLDER, Checkpoint, checkpoint_files, load_checkpoint
+from learner.checkpoint import FOLDER, Checkpoint, checkpoint_files, newest_readable
 
 CONFIG_FILE: Final = "config.json"
 LOCK_FILE: Final = "learner.lock"
 EPOCH_FILE: Final = "epoch"
 """Holds the last epoch that was opened, since an epoch may end before its first checkpoint."""
+UPDATES_FILE: Final = "updates.jsonl"
+DAMAGED_SUFFIX: Final = ".damaged"
+"""Put at the end of the name of a damaged checkpoint, which is thereby no checkpoint any more."""
+
+_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -44,7 +51,7 @@ class RunFolder:
     @property
     def updates(self) -> Path:
         """The record of applied updates."""
-        return self.path / "updates.jsonl"
+        return self.path / UPDATES_FILE
 
     @property
     def log(self) -> Path:
@@ -91,7 +98,7 @@ def open_run_folder(path: Path, config: RunConfig) -> Iterator[RunFolder]:
         message = f"Cannot use '{path}' as a run folder ({error.strerror}); choose another folder."
         raise InvalidValueError(message) from error
     try:
-        yield _open_locked(path, config)
+        yield _opened(path, config)
     finally:
         lock.release()
 
@@ -109,6 +116,14 @@ def _refuse_foreign(path: Path) -> None:
         raise InvalidValueError(message)
 
 
+def _opened(path: Path, config: RunConfig) -> RunFolder:
+    try:
+        return _open_locked(path, config)
+    except OSError as error:
+        message = f"Cannot write the run folder '{path}' ({error.strerror}); mend it or choose another folder."
+        raise InvalidValueError(message) from error
+
+
 def _open_locked(path: Path, config: RunConfig) -> RunFolder:
     file = path / CONFIG_FILE
     if file.exists():
@@ -122,10 +137,31 @@ def _open_locked(path: Path, config: RunConfig) -> RunFolder:
     else:
         text = json.dumps(config.to_json(), indent=2) + "\n"
         replace_file(file, lambda temporary: temporary.write_text(text, encoding="utf-8"))
-    checkpoint = load_checkpoint(path) if checkpoint_files(path / FOLDER) else None
+    checkpoint = _resume(path) if checkpoint_files(path / FOLDER) else None
     epoch = 1 + max(_last_epoch(path), checkpoint.epoch if checkpoint else 0)
     replace_file(path / EPOCH_FILE, lambda temporary: temporary.write_text(f"{epoch}\n", encoding="utf-8"))
     return RunFolder(path, config, epoch, checkpoint)
+
+
+def _resume(path: Path) -> Checkpoint:
+    """Return the newest checkpoint that can be read; damaged newer ones are set aside, nothing is lost."""
+    checkpoint, damaged = newest_readable(path / FOLDER)
+    if damaged and (path / UPDATES_FILE).exists():
+        # The learner will cut off the updates after the checkpoint, which may be all that is left of much training.
+        record = _unused(path / f"updates-{max(file.stem for file in damaged)}.jsonl")
+        shutil.copy2(path / UPDATES_FILE, record)
+        _log.warning("the record of updates so far is kept as '%s'", record)
+    for file, error in damaged.items():
+        aside = _unused(file.with_name(file.name + DAMAGED_SUFFIX))
+        file.rename(aside)
+        _log.warning("%s It is kept as '%s'; going on from version %d.", error, aside, checkpoint.version)
+    return checkpoint
+
+
+def _unused(path: Path) -> Path:
+    """Return a path where nothing is, by a number at the end of the name if need be."""
+    candidates = (path, *(path.with_name(f"{path.name}.{number}") for number in range(2, 1000)))
+    return next(candidate for candidate in candidates if not candidate.exists())
 
 
 def _last_epoch(path: Path) -> int:

@@ -1,9 +1,6 @@
 import json
 import logging
 import pickle
-import resource
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,6 +12,7 @@ from hoz_dist.errors import DamagedFileError, InvalidValueError, NotFoundError
 from learner.checkpoint import Checkpoint, checkpoint_files, load_checkpoint, save_checkpoint
 from learner.core import LearnerCore
 from learner.events import EpisodesReceived, RoomGraphReceived
+from tests.unit.learner.disk import full_disk
 from tests.unit.learner.making import CONFIG, answer, episodes, gradient, push, room_graph, room_push, vector
 
 
@@ -74,17 +72,6 @@ def test_what_a_killed_process_left_half_written_is_cleared_away(tmp_path: Path,
     (tmp_path / "000000001.safetensors.tmp").write_bytes(b"half")
     path = save_checkpoint(tmp_path, checkpoint)
     assert list(tmp_path.iterdir()) == [path]
-
-
-@contextmanager
-def full_disk(most_bytes: int) -> Iterator[None]:
-    """Let the kernel fail every write beyond that size, as a full disk does."""
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (most_bytes, hard))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
 def test_a_full_disk_leaves_the_older_checkpoint_and_nothing_half_written(

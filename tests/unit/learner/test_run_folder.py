@@ -8,6 +8,7 @@ from hoz_dist.errors import DamagedFileError, InvalidValueError, NotFoundError, 
 from learner.checkpoint import save_checkpoint
 from learner.core import LearnerCore
 from learner.run_folder import open_run_folder, read_config
+from tests.unit.learner.disk import full_disk
 from tests.unit.learner.making import CONFIG, gradient, push, vector
 
 
@@ -39,6 +40,51 @@ def test_every_learner_opens_a_new_epoch_even_if_the_last_one_saved_nothing(tmp_
         with open_run_folder(tmp_path, CONFIG) as folder:
             epochs.append(folder.epoch)
     assert epochs == [1, 2, 3]
+
+
+def test_a_damaged_newest_checkpoint_is_set_aside_and_nothing_is_lost(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    lines = "".join(f"{number}\n" for number in range(3))
+    damaged = []
+    for _ in range(2):
+        with open_run_folder(tmp_path, CONFIG) as folder:
+            core = LearnerCore(CONFIG, vector(0), epoch=folder.epoch)
+            for version in range(3):
+                push(core, gradient(version, epoch=core.epoch, version=version))
+                newest = save_checkpoint(folder.checkpoints, core.snapshot(0.0))
+            folder.updates.write_text(lines)
+        damaged.append(newest.read_bytes()[:-9])
+        newest.write_bytes(damaged[-1])
+        with open_run_folder(tmp_path, CONFIG) as folder:
+            assert folder.checkpoint is not None
+            assert folder.checkpoint.version == 2
+        assert f"'{newest}' is damaged" in caplog.text
+    names = ("000000003.safetensors.damaged", "000000003.safetensors.damaged.2")
+    for name, content in zip(names, damaged, strict=True):
+        assert (tmp_path / "checkpoints" / name).read_bytes() == content
+        assert name in caplog.text
+    for name in ("updates-000000003.jsonl", "updates-000000003.jsonl.2"):
+        assert (tmp_path / name).read_text() == lines
+        assert name in caplog.text
+
+
+def test_when_every_checkpoint_is_damaged_nothing_is_touched(tmp_path: Path) -> None:
+    with open_run_folder(tmp_path, CONFIG) as folder:
+        save_checkpoint(folder.checkpoints, LearnerCore(CONFIG, vector(0)).snapshot(0.0)).write_bytes(b"")
+    before = contents(tmp_path)
+    with pytest.raises(DamagedFileError, match="None of the 1 checkpoints"), open_run_folder(tmp_path, CONFIG):
+        pass
+    assert contents(tmp_path) == before
+
+
+def test_a_full_disk_is_said_in_one_sentence(tmp_path: Path) -> None:
+    with (
+        full_disk(1),
+        pytest.raises(InvalidValueError, match="Cannot write the run folder"),
+        open_run_folder(tmp_path, CONFIG),
+    ):
+        pass
 
 
 def test_another_configuration_is_refused_with_each_difference(tmp_path: Path) -> None:
