@@ -1,3 +1,5 @@
+import logging
+
 import numpy as np
 import pytest
 
@@ -36,17 +38,43 @@ def test_a_known_graph_changes_nothing() -> None:
     assert store.versions == {"kitchen": 1}
 
 
+def test_another_graph_of_the_same_room_is_taken_without_a_change_and_said_once(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    store = GraphStore(ZONES, {})
+    first = room_graph("kitchen/1")
+    store.add(first)
+    with caplog.at_level(logging.INFO):
+        for seed in (5, 6):
+            assert not store.add(room_graph("kitchen/1", seed=seed))
+    assert [record.levelname for record in caplog.records] == ["INFO"]
+    np.testing.assert_array_equal(store.rooms["kitchen/1"].nodes, first.nodes)
+    assert store.versions == {"kitchen": 1}
+
+
+def test_saved_graphs_of_rooms_that_changed_are_dropped(caplog: pytest.LogCaptureFixture) -> None:
+    saved = [room_graph("kitchen/1"), room_graph("kitchen/2"), room_graph("bathroom/1")]
+    digests = {"kitchen/1": "new", "kitchen/2": "d0", "bathroom/1": "new"}
+    store = GraphStore(ZONES, digests, saved, {"kitchen": 2, "bathroom": 1})
+    assert list(store.rooms) == ["kitchen/2"]
+    assert store.scenes.keys() == {"kitchen"}
+    assert store.scenes["kitchen"].version == 3
+    assert "dropped the saved graph of kitchen/1" in caplog.text
+    assert store.add(room_graph("kitchen/1", digest="new"))
+    assert store.add(room_graph("bathroom/1", digest="new"))
+    assert store.versions == {"kitchen": 4, "bathroom": 3}
+
+
 @pytest.mark.parametrize(
     ("graph", "reason"),
     [
-        (room_graph("kitchen/1", seed=5), Reason.DIGEST),
         (room_graph("kitchen/1", digest="another"), Reason.DIGEST),
         (room_graph("kitchen/2", digest="another"), Reason.DIGEST),
         (room_graph("kitchen/25"), Reason.SPLIT),
         (room_graph("kitchen/30"), Reason.SPLIT),
         (room_graph("kitchen/3", zones=ZONES + 1), Reason.SHAPE),
     ],
-    ids=["other graph", "other content", "not of the catalogue", "validation", "test", "zones"],
+    ids=["other content", "not of the catalogue", "validation", "test", "zones"],
 )
 def test_a_graph_that_cannot_be_taken_leaves_the_store_as_it_was(graph: RoomGraph, reason: Reason) -> None:
     store = GraphStore(ZONES, {"kitchen/2": "d0"})
