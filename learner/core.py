@@ -18,6 +18,7 @@ from hoz_dist.nav.categories import TARGETS
 from hoz_dist.wire.messages import Accepted, Busy, GradientPush, Refused, RoomGraphPush
 from hoz_dist.wire.rejection import Reason, RejectedError
 from learner.checkpoint import Checkpoint
+from learner.clock import TrainingClock
 from learner.deduplication import SeenPushes, Sender
 from learner.events import (
     Effect,
@@ -42,6 +43,10 @@ LOSS_TERMS: Final = ("policy_loss", "value_loss", "entropy", "scene_loss")
 """Fields of `EpisodesPush` that are recorded for TensorBoard."""
 GRAPH_CHECKPOINT_SECONDS: Final = 2.0
 """A new room graph is saved this soon: rooms are few, and each took an actor a whole exploration."""
+
+
+MOST_NAMED: Final = 20
+"""Recorded actors that are named to one that is not among them."""
 
 
 class LearnerCore:
@@ -83,10 +88,7 @@ class LearnerCore:
         self._checkpoint_seconds = checkpoint_seconds
         self._checkpoint_due: float | None = None
         """When to save; None while nothing changed."""
-        self._seconds_before = 0.0
-        """Training time of earlier epochs."""
-        self._began: float | None = None
-        """When training began in this epoch: with the first room graph or gradient."""
+        self._clock = TrainingClock()
         if checkpoint is not None:
             self._resume(checkpoint, room_digests or {})
 
@@ -103,8 +105,8 @@ class LearnerCore:
         return self._optimizer.learning_rate
 
     def seconds(self, now: float) -> float:
-        """Return the training time so far, in all epochs."""
-        return self._seconds_before + (now - self._began if self._began is not None else 0.0)
+        """Return the training time so far, in all epochs: while gradients or room graphs came that counted."""
+        return self._clock.seconds(now)
 
     def progress(self, now: float) -> float | None:
         """Return the share of the budget used, in [0, 1]; None without a budget."""
@@ -203,9 +205,17 @@ class LearnerCore:
         Its entries are finite: a message with others cannot be made.
         """
         lag, size = self.version - push.version, self._optimizer.size
-        unknown = self._schedule is not None and self._schedule.turn(push.actor, push.sequence) == "never"
+        schedule = self._schedule
+        stranger = schedule is not None and push.actor not in schedule.actors
+        unknown = schedule is not None and schedule.turn(push.actor, push.sequence) == "never"
+        recorded = ", ".join(schedule.actors[:MOST_NAMED]) if schedule is not None else ""
         checks = (
             (self.finished, Reason.FINISHED, "the budget is used up"),
+            (
+                stranger,
+                Reason.NAME,
+                f"the recorded run has no actor '{push.actor}'; start one actor --name for each of: {recorded}",
+            ),
             (push.epoch != self.epoch, Reason.EPOCH, f"computed in epoch {push.epoch}, now is {self.epoch}"),
             (lag < 0, Reason.STALE, f"computed on version {push.version}, the newest is {self.version}"),
             (lag > self.config.max_lag, Reason.STALE, f"{lag} versions behind, the bound is {self.config.max_lag}"),
@@ -216,7 +226,7 @@ class LearnerCore:
 
     def _apply(self, sender: Sender, push: GradientPush, now: float) -> Iterator[Effect]:
         lag = self.version - push.version
-        self._began = now if self._began is None else self._began
+        self._clock.push(now)
         self._optimizer.set_progress(self.progress(now) or 0.0)
         if self._schedule is not None:
             self._optimizer.learning_rate = self._schedule.take(push.version)
@@ -261,7 +271,8 @@ class LearnerCore:
             return
         self._seen.add(sender, push.sequence)
         self.statistics.actor(push.actor, now).rooms.add(str(push.room))
-        self._began = now if self._began is None else self._began
+        if not self.finished:
+            self._clock.push(now)
         if changed:
             self._save_within(min(GRAPH_CHECKPOINT_SECONDS, self._checkpoint_seconds), now)
             yield PublishGraph(push.room)
@@ -283,6 +294,7 @@ class LearnerCore:
         repeated = self._schedule is not None and self._schedule.done
         if not self.finished and (repeated or self.progress(now) == 1.0):
             self.finished = True
+            self._clock.stop(now)
             self._checkpoint_due = None
             return SaveCheckpoint(keep=True), Finish()
         if self._checkpoint_due is not None and now >= self._checkpoint_due:
@@ -321,4 +333,4 @@ class LearnerCore:
         self.graphs = GraphStore(self.config.zones, room_digests, checkpoint.rooms, checkpoint.graph_versions)
         self.statistics = Statistics(checkpoint.frames, checkpoint.episodes, checkpoint.recent)
         self._seen = SeenPushes(checkpoint.seen)
-        self._seconds_before = checkpoint.seconds
+        self._clock = TrainingClock(checkpoint.seconds)

@@ -51,7 +51,7 @@ class UpdateRecord(NamedTuple):
 
 
 def read_updates(path: Path) -> list[UpdateRecord]:
-    """Read ``updates.jsonl``.
+    """Read ``updates.jsonl``; a last line that a killed learner did not finish is left out.
 
     Raises:
         NotFoundError: There is no such file.
@@ -60,7 +60,10 @@ def read_updates(path: Path) -> list[UpdateRecord]:
     records: list[UpdateRecord] = []
     try:
         with path.open(encoding="utf-8") as file:
-            records.extend(map(UpdateRecord.from_line, file))
+            for line in file:
+                if records and not line.endswith("\n"):
+                    break
+                records.append(UpdateRecord.from_line(line))
     except OSError as error:
         message = f"Cannot read the recorded updates '{path}' ({error.strerror}); give the updates.jsonl of a run."
         raise NotFoundError(message) from error
@@ -74,18 +77,26 @@ class Schedule:
     """The recorded order in which gradients are to be applied.
 
     Actors are matched by name and sequence number; their incarnations differ from run to run.
+
+    Args:
+        records: All updates of the recorded run.
+        applied: Number of them that were repeated before, by an earlier learner.
+
+    Attributes:
+        actors: Names of the recorded actors, sorted.
     """
 
-    def __init__(self, records: Sequence[UpdateRecord]) -> None:
+    def __init__(self, records: Sequence[UpdateRecord], applied: int = 0) -> None:
+        self.actors = sorted({record.actor for record in records})
         self._records = records
-        self._next = 0
-        self._left = Counter((record.actor, record.sequence) for record in records)
+        self._next = min(applied, len(records))
+        self._left = Counter((record.actor, record.sequence) for record in records[self._next :])
         self.diverged = 0
         """Gradients that were computed on another version than the recorded one: the run is not the recorded one."""
 
     @property
     def applied(self) -> int:
-        """Number of updates repeated so far."""
+        """Number of updates repeated so far, by all learners of the run."""
         return self._next
 
     @property

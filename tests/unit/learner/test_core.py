@@ -11,6 +11,7 @@ from hoz_dist.errors import InvalidValueError
 from hoz_dist.nav.categories import TARGETS
 from hoz_dist.wire.messages import Accepted, Busy, GradientPush, Refused
 from hoz_dist.wire.rejection import Reason
+from learner.clock import LONGEST_GAP_S
 from learner.core import GRAPH_CHECKPOINT_SECONDS, LearnerCore
 from learner.events import (
     EpisodesReceived,
@@ -175,11 +176,11 @@ def test_a_known_room_graph_is_acknowledged_and_changes_nothing() -> None:
     assert isinstance(replies(effects)[0].answer, Accepted)
 
 
-def test_a_conflicting_room_graph_is_refused_and_the_first_kept() -> None:
+def test_a_graph_of_another_content_of_a_room_is_refused_and_the_first_kept() -> None:
     core = new_core()
     first = room_graph("kitchen/3")
     answer(core, RoomGraphReceived(0, room_push(0, first)))
-    reply = answer(core, RoomGraphReceived(0, room_push(1, room_graph("kitchen/3", seed=1))))
+    reply = answer(core, RoomGraphReceived(0, room_push(1, room_graph("kitchen/3", seed=1, digest="another"))))
     assert isinstance(reply, Refused)
     assert reply.reason == Reason.DIGEST
     np.testing.assert_array_equal(core.graphs.rooms["kitchen/3"].nodes, first.nodes)
@@ -222,6 +223,24 @@ def test_a_budget_of_minutes_counts_from_the_first_push() -> None:
     assert core.status(1015.0)["seconds_left"] == 45.0
     assert Finish() not in core.handle(Tick(), now=1059.0)
     assert Finish() in core.handle(Tick(), now=1060.0)
+
+
+def test_time_without_actors_does_not_use_up_the_budget() -> None:
+    core = new_core(replace(CONFIG, minutes=10.0))
+    push(core, gradient(0), now=0.0)
+    morning = 8 * 3600.0
+    assert core.handle(Tick(), now=morning) == [SaveCheckpoint(keep=False)]
+    push(core, gradient(1, version=1), now=morning)
+    assert core.status(morning)["progress"] == LONGEST_GAP_S / 600.0
+    assert core.learning_rate == pytest.approx(0.009)
+
+
+def test_time_stands_still_after_the_end() -> None:
+    core = new_core(replace(CONFIG, frames=10))
+    push(core, gradient(0), now=0.0)
+    push(core, gradient(1, version=1), now=5.0)
+    answer(core, RoomGraphReceived(0, room_push(0, room_graph("kitchen/3"))), now=20.0)
+    assert core.seconds(50.0) == 0.0
 
 
 def test_without_a_budget_the_learning_rate_stays() -> None:
@@ -323,6 +342,14 @@ def test_a_recorded_order_gives_identical_parameters() -> None:
     assert first.parameters.tobytes() == second.parameters.tobytes()
     assert second.finished
     assert second.status(0.0)["replay"] == {"applied": 4, "total": 4, "diverged": 0}
+
+
+def test_an_actor_that_the_recorded_run_did_not_have_is_told_whom_it_had() -> None:
+    records = recorded(new_core(), gradient(0, actor="anna"), gradient(0, actor="ben", version=1))
+    refusal = refused(new_core(schedule=Schedule(records)), gradient(0, actor="carl"))
+    assert refusal.reason == Reason.NAME
+    assert "no actor 'carl'" in refusal.detail
+    assert "--name for each of: anna, ben" in refusal.detail
 
 
 def test_a_gradient_that_the_recorded_run_did_not_apply_is_refused() -> None:

@@ -30,6 +30,20 @@ def test_a_damaged_file_is_said_with_the_line(tmp_path: Path, line: str) -> None
         read_updates(file)
 
 
+@pytest.mark.parametrize("left", [1, 20, -1])
+def test_a_last_line_that_was_not_finished_is_left_out(tmp_path: Path, left: int) -> None:
+    file = tmp_path / "updates.jsonl"
+    file.write_text(record("a", 0).to_line() + record("b", 1).to_line()[:left])
+    assert read_updates(file) == [record("a", 0)]
+
+
+def test_a_restarted_learner_goes_on_in_the_record() -> None:
+    schedule = Schedule([record("a", 0), record("b", 0), record("a", 1)], applied=2)
+    assert (schedule.applied, schedule.total, schedule.done) == (2, 3, False)
+    assert (schedule.turn("b", 0), schedule.turn("a", 1)) == ("never", "now")
+    assert schedule.actors == ["a", "b"]
+
+
 def test_updates_are_taken_in_the_recorded_order() -> None:
     schedule = Schedule([record("a", 0, 0.3), record("b", 0, 0.2), record("a", 2, 0.1)])
     assert [schedule.turn(*push) for push in (("a", 0), ("b", 0), ("a", 1), ("a", 2))] == [
