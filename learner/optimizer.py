@@ -85,18 +85,17 @@ class FlatAdam:
         """Set the learning rate to ``base * (1 - progress)``; progress is the share of the budget used."""
         self.learning_rate = self.base_learning_rate * (1.0 - min(max(progress, 0.0), 1.0))
 
-    def step(self, gradient: Vector, norm: float, weight: float = 1.0, learning_rate: float | None = None) -> None:
+    def step(self, gradient: Vector, norm: float, weight: float = 1.0) -> None:
         """Apply one gradient.
 
         Args:
             gradient: [P], finite; left as it is, and may be read-only (the bytes of a message).
             norm: Its `gradient_norm`.
             weight: Its factor, see `lag_weight`.
-            learning_rate: Used instead of the scheduled one, to repeat a recorded run.
         """
         bounded = self.max_norm / norm if norm > self.max_norm * (1.0 + NORM_TOLERANCE) else 1.0
         np.multiply(gradient, np.float32(bounded * weight), out=self._gradient)
-        self._adam.param_groups[0]["lr"] = self.learning_rate if learning_rate is None else learning_rate
+        self._adam.param_groups[0]["lr"] = self.learning_rate
         self._adam.step()
 
     def state(self) -> AdamState:

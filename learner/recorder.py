@@ -1,11 +1,16 @@
 """What the learner writes down as it goes: TensorBoard scalars and the record of updates."""
 
+import contextlib
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from torch.utils.tensorboard import SummaryWriter
 
+from hoz_dist.errors import InvalidValueError
 from learner.replay import UpdateRecord
+
+RETRY_RECORDS: Final = 12
+"""After a failure so many records are left out before TensorBoard's file is tried again."""
 
 
 class ScalarRecorder:
@@ -17,10 +22,42 @@ class ScalarRecorder:
     """
 
     def __init__(self, folder: Path, frames: int) -> None:
-        self._writer = SummaryWriter(str(folder), purge_step=frames or None)
+        self._folder = folder
+        self._frames = frames
+        self._writer: SummaryWriter | None = None
+        self._failure: OSError | None = None
+        self._left_out = 0
+        """Records that are still to be left out, because of the failure."""
 
     def record(self, status: dict[str, Any]) -> None:
-        """Write the scalars of a status, see `LearnerCore.status`."""
+        """Write the scalars of a status, see `LearnerCore.status`.
+
+        Raises:
+            OSError: The disk is full, for example; or was, and it is not yet tried again.
+        """
+        if self._failure is not None and self._left_out:
+            self._left_out -= 1
+            raise self._failure
+        try:
+            if self._writer is None:
+                self._writer = SummaryWriter(str(self._folder), purge_step=self._frames or None)
+            self._add(self._writer, status)
+            self._writer.flush()
+        except OSError as error:
+            # TensorBoard's thread has ended; a new writer begins a new file.
+            self.close()
+            self._failure, self._left_out, self._frames = error, RETRY_RECORDS, status["frames"]
+            raise
+
+    def close(self) -> None:
+        """Write what is still in memory, if the disk takes it."""
+        if self._writer is not None:
+            with contextlib.suppress(OSError):
+                self._writer.close()
+        self._writer = None
+
+    @staticmethod
+    def _add(writer: SummaryWriter, status: dict[str, Any]) -> None:
         success, lag = status["success"], status["lag"]
         scalars: dict[str, float | None] = {
             "n_frames": status["frames"],
@@ -37,11 +74,7 @@ class ScalarRecorder:
         scalars |= {f"loss/{name}": value for name, value in status["losses"].items()}
         for tag, value in scalars.items():
             if value is not None:
-                self._writer.add_scalar(tag, value, status["frames"])
-
-    def close(self) -> None:
-        """Write what is still in memory."""
-        self._writer.close()
+                writer.add_scalar(tag, value, status["frames"])
 
 
 class UpdateLog:
@@ -50,24 +83,44 @@ class UpdateLog:
     Args:
         path: The file.
         version: Version that the run goes on from; lines of updates that were lost with an earlier learner are cut off.
+
+    Raises:
+        InvalidValueError: The file cannot be read or written.
     """
 
     def __init__(self, path: Path, version: int) -> None:
-        path.touch()
-        with path.open("r+b") as file:
-            for _ in range(version):
-                file.readline()
-            file.truncate()
-        self._file = path.open("a", encoding="utf-8")
+        try:
+            path.touch()
+            with path.open("rb") as file:
+                for _ in range(version):
+                    file.readline()
+                self._size = file.tell()
+            self._file = path.open("r+b", buffering=0)
+            self._file.truncate(self._size)
+        except OSError as error:
+            message = f"Cannot write '{path}' ({error.strerror}); mend it or choose another run folder."
+            raise InvalidValueError(message) from error
+        self._pending: list[str] = []
 
     def write(self, record: UpdateRecord) -> None:
-        """Add an update; it is on the disk after the next `flush`."""
-        self._file.write(record.to_line())
+        """Add an update; it is in the file after the next `flush`."""
+        self._pending.append(record.to_line())
 
     def flush(self) -> None:
-        """Hand all lines to the operating system."""
-        self._file.flush()
+        """Hand all lines to the operating system.
+
+        Raises:
+            OSError: The disk is full, for example; the next call tries the same lines again.
+        """
+        lines = "".join(self._pending).encode()
+        # What an earlier call wrote only in part is written over.
+        self._file.seek(self._size)
+        left = memoryview(lines)
+        while left:
+            left = left[self._file.write(left) :]
+        self._size += len(lines)
+        self._pending.clear()
 
     def close(self) -> None:
-        """Write what is still in memory."""
+        """Close the file; lines that were not flushed are lost."""
         self._file.close()

@@ -2,22 +2,23 @@
 
 One thread, the one that calls `serve`, takes pushes from the server's bounded inbox, lets the core handle them, and
 carries out the effects in order. Questions are answered by the server's threads from snapshots. Checkpoints are copied
-in this thread and written in another.
+in this thread and written in another. A disk that fails is said once in the log, and training goes on.
 """
 
 import json
 import logging
 import threading
 import time
-from collections.abc import Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, Self
 
 from hoz_dist.config import RunConfig
 from hoz_dist.errors import InvalidValueError
+from hoz_dist.graph.room_graph import RoomGraph
+from hoz_dist.graph.scene_graph import SceneGraph
 from hoz_dist.nav.categories import TARGETS
 from hoz_dist.policy.parameters import initial_parameters
 from hoz_dist.sim.catalogue import CATALOGUE_PATH
@@ -33,12 +34,14 @@ from hoz_dist.wire.messages import (
     RoomGraphPush,
     StatusReply,
 )
+from hoz_dist.wire.outage import Outage
 from hoz_dist.wire.parameters import ParametersPublisher
 from hoz_dist.wire.rejection import Reason
+from hoz_dist.wire.rejections import Rejections
 from hoz_dist.wire.server import Server
 from hoz_dist.wire.session import Session, open_router
 from hoz_dist.wire.snapshots import Snapshots
-from learner.checkpoint import save_checkpoint
+from learner.checkpoint_writer import CheckpointWriter
 from learner.core import LearnerCore
 from learner.events import (
     Effect,
@@ -103,15 +106,14 @@ def serve(settings: LearnerSettings, stop: threading.Event) -> None:
         _log_to(folder.log),
     ):
         checkpoint = folder.checkpoint
-        if checkpoint is not None and schedule is not None:
-            schedule = schedule[checkpoint.version :]
+        applied = checkpoint.version if checkpoint is not None else 0
         core = LearnerCore(
             settings.config,
             initial_parameters(settings.config.policy, settings.config.seed),
             epoch=folder.epoch,
             checkpoint=checkpoint,
             room_digests=catalogue_digests(),
-            schedule=Schedule(schedule) if schedule is not None else None,
+            schedule=Schedule(schedule, applied) if schedule is not None else None,
             checkpoint_seconds=settings.checkpoint_seconds,
         )
         _log.info(
@@ -130,25 +132,27 @@ class Learner:
         self._folder = folder
         self._name = keys.run
         self._status = core.status(time.monotonic())
+        self._rejections = Rejections()
         self._done_since: float | None = None
-        self._writing: Future[Path] | None = None
+        self._updates_disk = Outage(_log, "cannot record updates (%s); training on", "updates are recorded again")
+        self._scalars_disk = Outage(_log, "cannot log to TensorBoard (%s); training on", "logging to TensorBoard again")
+        self._checkpoints = CheckpointWriter(folder.checkpoints, core.snapshot)
         with ExitStack() as stack:
             self._updates = UpdateLog(folder.updates, core.version)
             stack.callback(self._updates.close)
             self._scalars = ScalarRecorder(folder.tensorboard, core.statistics.frames)
             stack.callback(self._scalars.close)
-            self._writer = stack.enter_context(ThreadPoolExecutor(1, "hoz-checkpoint"))
             stack.callback(self._save_last)
             self._members = stack.enter_context(Members(session, keys))
             self._parameters = stack.enter_context(ParametersPublisher(session, keys))
             config = ConfigReply(self._name, core.epoch, TARGETS, core.config.to_json())
             snapshots = Snapshots(config, self.status, core.config.edge_cost)
             self._publish_parameters()
-            self._server = stack.enter_context(Server(session, keys, snapshots))
-            for room in core.graphs.rooms.values():
-                self._server.put_graph(room)
-            for scene in core.graphs.scenes.values():
-                self._server.put_graph(scene)
+            graphs: list[RoomGraph | SceneGraph] = [*core.graphs.rooms.values(), *core.graphs.scenes.values()]
+            # The last thing that opens: what it answers with is all there.
+            self._server = stack.enter_context(
+                Server(session, keys, snapshots, rejections=self._rejections, graphs=graphs)
+            )
             stack.enter_context(declare_alive(session, keys, Member(NAME, NAME)))
             self._open = stack.pop_all()
 
@@ -168,6 +172,7 @@ class Learner:
                 self._carry_out(self._core.handle(Tick(), now), None, now)
             else:
                 self._handle(request, now)
+            self._checkpoints.poll(now)
             if now >= renew_at:
                 self._status = self._core.status(now)
                 renew_at = now + STATUS_S
@@ -178,7 +183,7 @@ class Learner:
     def status(self) -> StatusReply:
         """Return the status that is served; called by the server's threads."""
         status = dict(self._status)
-        actors, rejected = status.pop("actors"), self._server.rejections.by_sender()
+        actors, rejected = status.pop("actors"), self._rejections.by_sender()
         return StatusReply(
             version=status.pop("version"),
             epoch=status.pop("epoch"),
@@ -186,7 +191,7 @@ class Learner:
                 _process_status(member, actors.get(member.id, {}), rejected.get(member.id, 0))
                 for member in self._members.current()
             ),
-            rejected=self._server.rejections.by_reason(),
+            rejected=self._rejections.by_reason(),
             details={"run": self._name, **status},
         )
 
@@ -214,43 +219,26 @@ class Learner:
                 case RecordUpdate(record):
                     self._updates.write(record)
                 case SaveCheckpoint(keep):
-                    self._save(keep=keep, now=now)
+                    self._flush_updates()
+                    self._checkpoints.save(now, keep=keep)
                 case Finish():
-                    _log.info("the budget is used up; the checkpoint of version %d is kept", self._core.version)
+                    _log.info("the run is over at version %d; its last checkpoint will be kept", self._core.version)
                     self._done_since = now
 
     def _publish_parameters(self) -> None:
         self._parameters.publish(self._core.epoch, self._core.version, self._core.parameters)
 
-    def _save(self, *, keep: bool, now: float) -> None:
-        """Copy the state and write it in the other thread."""
-        self._wait_for_writer()
-        self._updates.flush()
-        self._writing = self._writer.submit(
-            save_checkpoint, self._folder.checkpoints, self._core.snapshot(now), keep=keep
-        )
-
-    def _wait_for_writer(self) -> None:
-        """Wait until the last checkpoint is written; normally it was long ago."""
-        writing, self._writing = self._writing, None
-        if writing is None:
-            return
-        try:
-            writing.result()
-        except OSError as error:
-            # Training on and trying again loses less than stopping would.
-            _log.error("could not save a checkpoint: %s; trying again at the next", error)
+    def _flush_updates(self) -> None:
+        _write(self._updates.flush, self._updates_disk)
 
     def _save_last(self) -> None:
         """Save at a clean stop.
 
         Raises:
-            OSError: It could not be written.
+            HozError: It could not be written.
         """
-        self._wait_for_writer()
-        self._updates.flush()
-        path = save_checkpoint(self._folder.checkpoints, self._core.snapshot(time.monotonic()))
-        _log.info("stopped; saved %s", path)
+        self._flush_updates()
+        _log.info("stopped; saved %s", self._checkpoints.close(time.monotonic()))
 
     def _may_leave(self) -> bool:
         """Tell whether the run is over and every actor knows, or had the time to ask."""
@@ -261,7 +249,8 @@ class Learner:
 
     def _record(self, now: float) -> None:
         status = self._core.status(now)
-        self._scalars.record(status)
+        self._flush_updates()
+        _write(lambda: self._scalars.record(status), self._scalars_disk)
         success, lag = status["success"]["overall"], status["lag"]
         _log.info(
             "%.3fM frames  %.0f frames/s  success %s  lag %.1f (max %d)  %d actors%s",
@@ -273,6 +262,16 @@ class Learner:
             sum(member.role != NAME for member in self._members.current()),
             "" if status["seconds_left"] is None else f"  {status['seconds_left']:.0f} s left",
         )
+
+
+def _write(write: Callable[[], None], disk: Outage) -> None:
+    """Write something without which training can go on."""
+    try:
+        write()
+    except OSError as error:
+        disk.failed(error)
+    else:
+        disk.worked()
 
 
 def catalogue_digests() -> dict[str, str]:
@@ -305,6 +304,13 @@ def _process_status(member: Member, actor: dict[str, Any], rejected: int) -> Pro
     )
 
 
+class _LogFile(logging.FileHandler):
+    """A log file whose disk may fill up; the console has the same lines."""
+
+    def handleError(self, record: logging.LogRecord) -> None:  # noqa: N802 - the name is logging's
+        """Lose the line."""
+
+
 @contextmanager
 def _log_to(path: Path) -> Iterator[None]:
     """Write what is logged into a file as well.
@@ -313,7 +319,7 @@ def _log_to(path: Path) -> Iterator[None]:
         InvalidValueError: The file cannot be written.
     """
     try:
-        handler = logging.FileHandler(path, encoding="utf-8")
+        handler = _LogFile(path, encoding="utf-8")
     except OSError as error:
         message = f"Cannot write '{path}' ({error.strerror}); mend it or choose another run folder."
         raise InvalidValueError(message) from error
@@ -325,4 +331,5 @@ def _log_to(path: Path) -> Iterator[None]:
         yield
     finally:
         root.removeHandler(handler)
-        handler.close()
+        with suppress(OSError):
+            handler.close()

@@ -1,6 +1,7 @@
 """The learner's service over real Zenoh, killed and restarted as a real process."""
 
 import json
+import resource
 import signal
 import subprocess
 import sys
@@ -20,6 +21,7 @@ from hoz_dist.wire.rejection import Reason
 from learner.checkpoint import load_checkpoint
 from learner.core import LearnerCore
 from learner.events import GradientReceived
+from learner.replay import read_updates
 from tests.integration.learning import (
     CONFIG,
     FakeActor,
@@ -165,6 +167,20 @@ def test_a_recorded_run_gives_identical_parameters_when_repeated(free_port: int,
     assert first.parameters.tobytes() == second.parameters.tobytes()
 
 
+def test_an_actor_that_the_record_does_not_have_is_refused_by_name(free_port: int, tmp_path: Path) -> None:
+    with running_learner(free_port, tmp_path / "first") as endpoint, FakeActor(endpoint, "first", "anna") as actor:
+        actor.gradient(0, (1, 0), gradient_for(actor.fetch(), 0))
+    record = tmp_path / "first" / "updates.jsonl"
+    with (
+        running_learner(free_port, tmp_path / "second", replay=record) as endpoint,
+        FakeActor(endpoint, "second", "box-4711") as actor,
+    ):
+        refusal = actor.gradient(0, (1, 0), gradient_for(actor.fetch(), 0))
+        assert isinstance(refusal, Refused)
+        assert refusal.reason == Reason.NAME
+        assert "anna" in refusal.detail
+
+
 def test_a_killed_learner_resumes_and_its_actors_carry_on(free_port: int, tmp_path: Path) -> None:
     run = tmp_path / "run"
     learner = LearnerProcess(free_port, run, "--checkpoint-seconds", "1")
@@ -194,6 +210,34 @@ def test_a_killed_learner_resumes_and_its_actors_carry_on(free_port: int, tmp_pa
     assert (saved.epoch, saved.version, saved.frames) == (2, 4, 80)
     assert len((run / "updates.jsonl").read_text().splitlines()) == 4
     assert (run / "learner.log").read_text().count("listening at") == 2
+
+
+def limit_files(learner: LearnerProcess, most_bytes: int) -> None:
+    """Let the kernel fail every write of a process beyond that size, as a full disk does."""
+    _, hard = resource.prlimit(learner.process.pid, resource.RLIMIT_FSIZE)
+    resource.prlimit(learner.process.pid, resource.RLIMIT_FSIZE, (most_bytes, hard))
+
+
+def test_a_full_disk_does_not_stop_the_training_and_is_said_at_the_end(free_port: int, tmp_path: Path) -> None:
+    run = tmp_path / "run"
+    with (
+        LearnerProcess(free_port, run, "--checkpoint-seconds", "1").ready() as learner,
+        FakeActor(learner.endpoint, "run") as actor,
+    ):
+        limit_files(learner, 1)
+        for sequence in range(2):
+            assert isinstance(actor.gradient(sequence, (1, sequence), gradient_for(actor.fetch(), sequence)), Accepted)
+        assert learner.process.stderr is not None
+        while "cannot save a checkpoint" not in (line := learner.process.stderr.readline()):
+            assert line, "the learner ended"
+        limit_files(learner, resource.RLIM_INFINITY)
+        wait_for_checkpoint(run, version=2)
+        limit_files(learner, 1)
+        assert isinstance(actor.gradient(2, (1, 2), gradient_for(actor.fetch(), 2)), Accepted)
+        assert learner.stop(signal.SIGTERM) == 2
+        assert "Cannot save the last checkpoint" in learner.process.stderr.read()
+    assert load_checkpoint(run).version == 2
+    assert len(read_updates(run / "updates.jsonl")) == 2
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

@@ -1,13 +1,16 @@
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
+from hoz_dist.errors import InvalidValueError
 from learner.core import LearnerCore
 from learner.events import EpisodesReceived
-from learner.recorder import ScalarRecorder, UpdateLog
+from learner.recorder import RETRY_RECORDS, ScalarRecorder, UpdateLog
 from learner.replay import UpdateRecord, read_updates
+from tests.unit.learner.disk import full_disk
 from tests.unit.learner.making import CONFIG, answer, episodes, gradient, push, vector
 
 
@@ -19,6 +22,7 @@ def write(path: Path, version: int, *records: UpdateRecord) -> None:
     log = UpdateLog(path, version)
     for item in records:
         log.write(item)
+    log.flush()
     log.close()
 
 
@@ -35,6 +39,49 @@ def test_a_record_that_was_deleted_begins_again(tmp_path: Path) -> None:
     path = tmp_path / "updates.jsonl"
     write(path, 9, record(9))
     assert read_updates(path) == [record(9)]
+
+
+def test_updates_that_a_full_disk_did_not_take_are_written_later_and_none_twice(tmp_path: Path) -> None:
+    path = tmp_path / "updates.jsonl"
+    log = UpdateLog(path, 0)
+    length = len(record(0).to_line())
+    with full_disk(int(2.5 * length)):
+        for sequence in range(4):
+            log.write(record(sequence))
+            if sequence < 2:
+                log.flush()
+            else:
+                with pytest.raises(OSError, match="too large"):
+                    log.flush()
+    # What a reader finds meanwhile is a line that is not finished.
+    assert read_updates(path) == [record(0), record(1)]
+    log.write(record(4))
+    log.flush()
+    log.close()
+    assert read_updates(path) == [record(sequence) for sequence in range(5)]
+
+
+def test_a_record_that_cannot_be_written_is_said_in_one_sentence(tmp_path: Path) -> None:
+    with pytest.raises(InvalidValueError, match="Cannot write"):
+        UpdateLog(tmp_path, 0)
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")  # of TensorBoard's own thread
+def test_scalars_that_a_full_disk_does_not_take_are_left_out(tmp_path: Path) -> None:
+    core = LearnerCore(CONFIG, vector(0))
+    scalars = ScalarRecorder(tmp_path, 0)
+    scalars.record(core.status(0.0))
+    with full_disk(100):
+        for _ in range(3):
+            with pytest.raises(OSError, match="too large"):
+                scalars.record(core.status(0.0))
+    push(core, gradient(0))
+    for _ in range(RETRY_RECORDS):
+        with suppress(OSError):
+            scalars.record(core.status(1.0))
+    scalars.record(core.status(1.0))
+    scalars.close()
+    assert EventAccumulator(str(tmp_path)).Reload().Scalars("n_frames")[-1].value == 10.0
 
 
 def test_scalars_are_logged_over_frames(tmp_path: Path) -> None:

@@ -1,0 +1,96 @@
+import logging
+import threading
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from hoz_dist.errors import HozError
+from learner.checkpoint import Checkpoint, checkpoint_files
+from learner.checkpoint_writer import RETRY_S, CheckpointWriter
+from learner.core import LearnerCore
+from tests.unit.learner.disk import full_disk
+from tests.unit.learner.making import CONFIG, vector
+
+WAIT_S = 10.0
+
+
+class Run:
+    """A run whose version is the time."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.writer = CheckpointWriter(folder, self.snapshot)
+        self._checkpoint = LearnerCore(CONFIG, vector(0)).snapshot(0.0)
+
+    def snapshot(self, now: float) -> Checkpoint:
+        return replace(self._checkpoint, version=int(now))
+
+    def versions(self) -> list[int]:
+        return [int(path.stem) for path in checkpoint_files(self.folder)]
+
+    def kept(self) -> list[int]:
+        return sorted(int(path.stem) for path in self.folder.glob("*.keep"))
+
+    def settle(self, now: float) -> None:
+        """Wait until what is being written is written, and tell the writer."""
+        barrier = threading.Event()
+        self.writer._thread.submit(barrier.set)
+        assert barrier.wait(WAIT_S)
+        self.writer.poll(now)
+
+
+@pytest.fixture
+def run(tmp_path: Path) -> Run:
+    return Run(tmp_path)
+
+
+def test_a_save_is_written_beside_the_training(run: Run) -> None:
+    run.writer.save(1.0, keep=False)
+    run.settle(2.0)
+    assert (run.versions(), run.kept()) == ([1], [])
+    assert run.writer.close(3.0).name == "000000003.safetensors"
+    assert run.versions() == [3, 1]
+
+
+def test_saves_while_one_is_written_become_one_and_do_not_wait(run: Run) -> None:
+    release = threading.Event()
+    run.writer._thread.submit(release.wait)
+    for now, keep in ((1.0, False), (2.0, True), (3.0, False)):
+        run.writer.save(now, keep=keep)
+    release.set()
+    run.settle(4.0)
+    run.settle(5.0)
+    assert (run.versions(), run.kept()) == ([4, 1], [4])
+    run.writer.close(6.0)
+
+
+def test_a_failed_save_is_said_once_and_soon_tried_again(run: Run, caplog: pytest.LogCaptureFixture) -> None:
+    caplog.set_level(logging.INFO)
+    with full_disk(1000):
+        run.writer.save(1.0, keep=True)
+        run.settle(1.0)
+        run.writer.poll(1.0 + RETRY_S)
+        run.settle(1.0 + RETRY_S)
+    run.writer.poll(2.0 * RETRY_S)
+    run.settle(2.0 * RETRY_S)
+    assert run.versions() == []
+    run.writer.poll(11.0 + RETRY_S)
+    run.settle(11.0 + RETRY_S)
+    assert (run.versions(), run.kept()) == ([16], [16])
+    assert [record.levelname for record in caplog.records] == ["WARNING", "INFO"]
+    assert "cannot save a checkpoint" in caplog.text
+    run.writer.close(20.0)
+
+
+def test_what_was_to_be_kept_and_failed_is_kept_at_the_stop(run: Run) -> None:
+    with full_disk(1000):
+        run.writer.save(1.0, keep=True)
+        run.settle(1.0)
+    run.writer.close(2.0)
+    assert (run.versions(), run.kept()) == ([2], [2])
+
+
+def test_a_last_checkpoint_that_cannot_be_written_is_said_in_one_sentence(run: Run) -> None:
+    with full_disk(1000), pytest.raises(HozError, match=r"Cannot save the last checkpoint in '.*' \(.+\); make room"):
+        run.writer.close(1.0)
