@@ -1,6 +1,5 @@
 """Runs a learner and its actors as child processes, and shows how the training goes."""
 
-import signal
 import tempfile
 import threading
 from collections.abc import Sequence
@@ -35,24 +34,19 @@ def launch(run: Path, endpoint: str, learner: Sequence[str], actor: Sequence[str
         HozError: A process failed; its own words are in the sentence.
         KeyboardInterrupt: Stopped by SIGINT or SIGTERM, after the children have stopped cleanly.
     """
-    # SIGTERM ends the training as Ctrl-C does: by way of the `with` statements.
-    previous = signal.signal(signal.SIGTERM, signal.default_int_handler)
-    try:
-        with tempfile.TemporaryDirectory(prefix="hoz-dist-") as logs, Children() as children:
-            options = ["learner", "--listen", endpoint, "--run", str(run), "--exit-when-done", *learner]
-            core = children.start("learner", options, Path(logs) / "learner")
-            client = _connect(endpoint, core)
-            if client is None:
-                click.echo(f"The run in {run} has used up its budget; another --run trains anew.")
-                return
-            with client:
-                for number in range(actors):
-                    name = f"actor-{number}"
-                    options = ["actor", "--connect", endpoint, "--name", name, *actor]
-                    children.start(name, options, run / f"{name}.log")
-                _watch(client, core, children)
-    finally:
-        signal.signal(signal.SIGTERM, previous)
+    with tempfile.TemporaryDirectory(prefix="hoz-dist-") as logs, Children() as children:
+        options = ["learner", "--listen", endpoint, "--run", str(run), "--exit-when-done", *learner]
+        core = children.start("learner", options, Path(logs) / "learner")
+        client = _connect(endpoint, core)
+        if client is None:
+            click.echo(f"The run in {run} has used up its budget; another --run trains anew.")
+            return
+        with client:
+            for number in range(actors):
+                name = f"actor-{number}"
+                options = ["actor", "--connect", endpoint, "--name", name, *actor]
+                children.start(name, options, run / f"{name}.log")
+            _watch(client, core, children)
 
 
 def _connect(endpoint: str, learner: Child) -> HozClient | None:

@@ -9,6 +9,8 @@ import click
 from hoz_dist.cli.connecting import connect_option, run_option
 from hoz_dist.cli.options import force_option
 from hoz_dist.errors import InvalidValueError
+from hoz_dist.nav.categories import category_index, scene_index
+from hoz_dist.nav.rooms import RoomId
 
 if TYPE_CHECKING:
     from hoz_dist.client import HozClient
@@ -66,12 +68,20 @@ def query_command(
     if (target is None) != (seen is None):
         message = "A plan needs both --target, the object to find, and --seen, what is seen now."
         raise InvalidValueError(message)
+    # What is wrong with the names is said before anybody is asked.
+    if "/" in name:
+        RoomId.parse(name)
+    else:
+        scene_index(name)
+    wanted = _names(seen) if seen is not None else []
+    for category in [*wanted, *([] if target is None else [target])]:
+        category_index(category)
 
     with HozClient(connect, run) as client:
-        if target is None or seen is None:
+        if target is None:
             content = _graph_content(_graph(client, name), shape)
         else:
-            content = _plan_content(client, name, target, seen, shape)
+            content = _plan_content(client, name, target, wanted, shape)
     if output is None:
         click.echo(content, nl=False)
         return
@@ -79,6 +89,11 @@ def query_command(
 
     write_atomically(output, content, overwrite=force)
     click.echo(f"Wrote {output}.")
+
+
+def _names(text: str) -> list[str]:
+    """Split names at commas."""
+    return [name.strip() for name in text.split(",") if name.strip()]
 
 
 def _format_of(output: Path | None) -> str:
@@ -110,12 +125,12 @@ def _graph_content(graph: "SceneGraph", shape: str) -> bytes:
             return _printed(title(graph), zone_table(graph, _TOP), edge_table(graph))
 
 
-def _plan_content(client: "HozClient", scene: str, target: str, seen: str, shape: str) -> bytes:
+def _plan_content(client: "HozClient", scene: str, target: str, seen: list[str], shape: str) -> bytes:
     """Ask for a plan and return it in a format."""
     if shape not in _PLAN_FORMATS:
         message = f"A plan has no {shape} form; choose one of {', '.join(sorted(_PLAN_FORMATS))}."
         raise InvalidValueError(message)
-    plan = client.plan(scene, target, [name.strip() for name in seen.split(",") if name.strip()])
+    plan = client.plan(scene, target, seen)
     match shape:
         case "json":
             import json
