@@ -6,7 +6,6 @@ same again. The wire's own threads only keep what arrived.
 
 import logging
 import threading
-import time
 import zlib
 from collections import Counter
 from collections.abc import Sequence
@@ -27,7 +26,7 @@ from hoz_dist.wire.graphs import scene_graph_of
 from hoz_dist.wire.messages import Accepted, Refused, SceneGraphReply
 from hoz_dist.wire.rejection import Reason
 from hoz_dist.wire.waiting import StoppedError
-from workers.collector import Collector, Update
+from workers.collector import Collector
 from workers.link import LearnerLink
 from workers.preparation import RoomPreparation
 
@@ -48,10 +47,7 @@ class RunOverError(Exception):
 class _Report:
     """What happened since the last report."""
 
-    began: float = field(default_factory=time.monotonic)
-    frames: int = 0
     updates: int = 0
-    lag: int = 0
     losses: Counter[str] = field(default_factory=Counter)
     """Sums of the terms of the loss."""
     episodes: list[EpisodeResult] = field(default_factory=list)
@@ -168,7 +164,8 @@ class Actor:
         match self._link.push_gradient(update.gradient, update.frames, parameters.head.stamp):
             case Accepted(epoch, version):
                 self._newest = (epoch, version)
-                self._account(update, lag=version - 1 - parameters.head.version)
+                self._report.updates += 1
+                self._report.losses.update(update.loss.terms())
             case Refused(Reason.FINISHED):
                 raise RunOverError
             case Refused(reason, detail) if reason in _PASSING:
@@ -178,21 +175,8 @@ class Actor:
                 message = f"The learner refused a gradient ({reason}): {detail}."
                 raise HozError(message)
 
-    def _account(self, update: Update, lag: int) -> None:
-        """Take an applied update into the report."""
-        report = self._report
-        report.frames += update.frames
-        report.updates += 1
-        # The learner may have applied others' gradients between this one and its answer.
-        report.lag += max(lag, 0)
-        report.losses.update(update.loss.terms())
-
     def _send_report(self) -> None:
         report, self._report = self._report, _Report()
         self._link.push_episodes(
-            report.episodes,
-            frames=report.frames,
-            frames_per_second=report.frames / (time.monotonic() - report.began),
-            lag=report.lag / report.updates,
-            losses={name: total / report.updates for name, total in report.losses.items()},
+            report.episodes, {name: total / report.updates for name, total in report.losses.items()}
         )

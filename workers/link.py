@@ -70,12 +70,13 @@ class LearnerLink:
     """
 
     def __init__(self, session: Session, actor: str, run: str | None, stop: threading.Event) -> None:
-        reply = find_run(session, run, JOIN_S)
+        reply = find_run(session, run, JOIN_S, stop)
         self.config = RunConfig.from_json(reply.config)
         self.run = reply.run
         self.epoch = reply.epoch
         self._session = session
         self._actor = actor
+        self._stop = stop
         self._keys = Keys(reply.run)
         self._stamp = (0, 0)
         """Epoch and version of the newest parameters that were fetched."""
@@ -129,10 +130,10 @@ class LearnerLink:
             HozError: It serves another configuration, or has begun anew.
         """
         try:
-            config = RunConfig.from_json(find_run(self._session, self.run).config)
+            config = RunConfig.from_json(find_run(self._session, self.run, stop=self._stop).config)
             heads = [
                 decode(answer.payload, ParametersHead)
-                for answer in ask(self._session, self._keys.params, timeout_s=FETCH_S)
+                for answer in ask(self._session, self._keys.params, timeout_s=FETCH_S, stop=self._stop)
             ]
         except HozError:
             return
@@ -169,31 +170,17 @@ class LearnerLink:
         )
         return self._pusher.push(self._keys.grads(self._actor), push)
 
-    def push_episodes(
-        self,
-        episodes: Sequence[EpisodeResult],
-        *,
-        frames: int,
-        frames_per_second: float,
-        lag: float,
-        losses: Mapping[str, float],
-    ) -> Accepted | Refused:
+    def push_episodes(self, episodes: Sequence[EpisodeResult], losses: Mapping[str, float]) -> Accepted | Refused:
         """Push how episodes ended and how the training goes.
 
         Args:
             episodes: Results, in the order in which the episodes ended.
-            frames: Environment frames since the last push.
-            frames_per_second: Speed since then.
-            lag: Mean policy lag since then, versions.
-            losses: Means of the terms of the loss since then: ``policy_loss, value_loss, entropy, scene_loss``.
+            losses: Means since the last push of ``policy_loss``, ``value_loss``, ``entropy`` and ``scene_loss``.
         """
         push = EpisodesPush(
             actor=self._actor,
             incarnation=self._incarnation,
             sequence=self._next(EpisodesPush),
-            frames=frames,
-            frames_per_second=frames_per_second,
-            lag=lag,
             episodes=tuple(episodes[:MAX_EPISODES]),
             **losses,
         )

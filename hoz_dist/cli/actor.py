@@ -55,17 +55,18 @@ def actor_command(
     import logging
     import signal
     import threading
-    from contextlib import ExitStack
+    from contextlib import ExitStack, suppress
 
     from hoz_dist.nav.rooms import training_rooms
     from hoz_dist.wire.session import open_client
+    from hoz_dist.wire.waiting import StoppedError
 
     rooms = training_rooms(scenes)
     logging.basicConfig(level=logging.INFO, format="%(asctime)s %(message)s", datefmt="%H:%M:%S")
     stop = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop.set())
-    with open_client(connect, CONNECT_S) as session:
+    with suppress(StoppedError), open_client(connect, CONNECT_S, stop) as session:
         # Only now, that somebody answers: these take seconds to import.
         import torch
 

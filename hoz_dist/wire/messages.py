@@ -95,9 +95,6 @@ class EpisodesPush(Push):
         value_loss: Mean value loss, likewise.
         entropy: Mean entropy of the policy, nats, likewise.
         scene_loss: Mean cross-entropy of the scene layer, nats, likewise; 0 without the layer.
-        frames: Not read; the learner counts the frames of gradients.
-        frames_per_second: Not read; the learner measures the speed.
-        lag: Not read; the learner measures the policy lag.
     """
 
     KIND: ClassVar[str] = "episodes"
@@ -108,9 +105,6 @@ class EpisodesPush(Push):
     value_loss: Annotated[float, Real()] = 0.0
     entropy: Annotated[float, Real()] = 0.0
     scene_loss: Annotated[float, Real()] = 0.0
-    frames: Annotated[int, Int()] = 0
-    frames_per_second: Annotated[float, Real(0.0)] = 0.0
-    lag: Annotated[float, Real(0.0)] = 0.0
 
 
 @dataclass(frozen=True, eq=False)
