@@ -9,7 +9,7 @@ from typing import Final
 import click
 
 from hoz_dist.cli.connecting import connect_option, run_option
-from hoz_dist.cli.options import cache_option
+from hoz_dist.cli.options import cache_option, weights_option
 from hoz_dist.nav.categories import SCENES
 
 CONNECT_S: Final = 5.0
@@ -31,11 +31,7 @@ CONNECT_S: Final = 5.0
     "--name",
     help="Name of this actor, unique in the run; its episodes follow from it and the run's seed.  [default: HOST-PID]",
 )
-@click.option(
-    "--weights",
-    type=click.Path(path_type=Path),
-    help="Weights of the resnet18 encoder, .safetensors or .pth.  [default: none needed]",
-)
+@weights_option
 @cache_option
 @click.option("--live", is_flag=True, help="Render every step in PyBullet instead of looking it up; slow.")
 def actor_command(

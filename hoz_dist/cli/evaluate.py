@@ -5,7 +5,7 @@ from pathlib import Path
 
 import click
 
-from hoz_dist.cli.options import cache_option
+from hoz_dist.cli.options import cache_option, weights_option
 from hoz_dist.nav.categories import SCENES
 
 
@@ -27,9 +27,7 @@ from hoz_dist.nav.categories import SCENES
     multiple=True,
     help=f"Scene to evaluate in: {', '.join(SCENES)}; may be repeated.  [default: those that it was trained in]",
 )
-@click.option(
-    "--weights", type=click.Path(path_type=Path), help="Weights of the resnet18 encoder.  [default: none needed]"
-)
+@weights_option
 @cache_option
 @click.option("--live", is_flag=True, help="Render every step in PyBullet instead of looking it up; slow.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON, in percent, instead of a table.")

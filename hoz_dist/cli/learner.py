@@ -1,13 +1,11 @@
 """`hoz-dist learner`: a learner process that actors, robots and queries connect to."""
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import click
 
-from hoz_dist.cli.options import picture_size_option
-from hoz_dist.config import PRESET_LEARNING_RATES, RunConfig
+from hoz_dist.cli.run_options import run_config, run_options
 
 
 @click.command("learner")
@@ -25,46 +23,9 @@ from hoz_dist.config import PRESET_LEARNING_RATES, RunConfig
     show_default=True,
     help="Folder of the run; one of the same configuration is resumed. Its last part is the run's name.",
 )
-@click.option(
-    "--model", "method", default=RunConfig.method, show_default=True, help="What guides the agent: a3c, object or hoz."
-)
-@click.option(
-    "--without",
-    multiple=True,
-    help="Layer of the model to switch off: object, scene, zone or done (the done reminder); may be repeated.",
-)
-@click.option("--preset", default=RunConfig.preset, show_default=True, help="Sizes of the network: compact or paper.")
-@click.option("--encoder", default=RunConfig.encoder, show_default=True, help="Visual encoder: pooled or resnet18.")
-@click.option(
-    "--weights",
-    type=click.Path(path_type=Path),
-    help="Weights of the resnet18 encoder, .safetensors or .pth.  [default: none needed]",
-)
-@picture_size_option
-@click.option("--zones", type=int, metavar="K", default=RunConfig.zones, show_default=True, help="Zones of a graph.")
-@click.option(
-    "--edge-cost",
-    default=RunConfig.edge_cost,
-    show_default=True,
-    help="What makes a path over zones short: product or normalized.",
-)
-@click.option(
-    "--seed", type=int, default=RunConfig.seed, show_default=True, help="Seed of the parameters and the episodes."
-)
+@run_options
 @click.option("--minutes", type=float, help="Budget of training time, minutes.  [default: none, until stopped]")
 @click.option("--frames", type=int, help="Budget of environment frames.  [default: none, until stopped]")
-@click.option(
-    "--learning-rate",
-    type=float,
-    help="Adam's step size at the start; falls linearly to 0 over the budget.  [default: 0.001 compact, 0.0001 paper]",
-)
-@click.option(
-    "--max-lag",
-    type=int,
-    default=RunConfig.max_lag,
-    show_default=True,
-    help="Largest policy lag of a gradient that is applied, parameter versions.",
-)
 @click.option(
     "--checkpoint-seconds",
     type=click.FloatRange(min=1.0),
@@ -84,8 +45,6 @@ from hoz_dist.config import PRESET_LEARNING_RATES, RunConfig
 def learner_command(
     listen: str,
     run: Path,
-    weights: Path | None,
-    learning_rate: float | None,
     checkpoint_seconds: float,
     replay: Path | None,
     *,
@@ -103,7 +62,7 @@ def learner_command(
     import threading
 
     # Before the imports that take seconds: it says what is wrong with the options.
-    config = _config(weights, learning_rate, choices)
+    config = run_config(choices)
 
     import torch
 
@@ -126,23 +85,3 @@ def learner_command(
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop.set())
     serve(settings, stop)
-
-
-def _config(weights: Path | None, learning_rate: float | None, choices: dict[str, Any]) -> RunConfig:
-    """Return the run's configuration.
-
-    Args:
-        weights: Of the encoder.
-        learning_rate: None for the preset's.
-        choices: The fields of the configuration that are options of the same name.
-    """
-    from hoz_dist.policy.encoders import load_encoder
-
-    config = RunConfig(**choices)  # checks the names before they are used below
-    encoder = load_encoder(config.encoder, weights)
-    return replace(
-        config,
-        learning_rate=PRESET_LEARNING_RATES[config.preset] if learning_rate is None else learning_rate,
-        encoder_key=encoder.key,
-        channels=encoder.channels,
-    )

@@ -22,6 +22,12 @@ picture_size_option = click.option(
     help="Side of the camera's square pictures, pixels.",
 )
 
+weights_option = click.option(
+    "--weights",
+    type=click.Path(path_type=Path),
+    help="Weights of the resnet18 encoder, .safetensors or .pth.  [default: none needed]",
+)
+
 json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON for scripts.")
 
 force_option = click.option("--force", is_flag=True, help="Replace the output file if it exists. Default: refuse.")
