@@ -1,0 +1,101 @@
+"""The options that make up a run's configuration; `hoz-dist learner` and `hoz-dist train` share them."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Final, TypeVar
+
+import click
+
+from hoz_dist.cli.options import picture_size_option, weights_option
+from hoz_dist.config import PRESET_LEARNING_RATES, RunConfig
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+_OPTIONS: Final = (
+    click.option(
+        "--model",
+        "method",
+        default=RunConfig.method,
+        show_default=True,
+        help="What guides the agent: a3c (nothing), object (object layer) or hoz (object, scene and zone layer, done "
+        "reminder).",
+    ),
+    click.option(
+        "--without",
+        multiple=True,
+        help="Layer of the model to switch off: object, scene, zone or done (the done reminder); may be repeated.",
+    ),
+    click.option(
+        "--preset", default=RunConfig.preset, show_default=True, help="Sizes of the network: compact or paper."
+    ),
+    click.option("--encoder", default=RunConfig.encoder, show_default=True, help="Visual encoder: pooled or resnet18."),
+    weights_option,
+    picture_size_option,
+    click.option(
+        "--zones", type=int, metavar="K", default=RunConfig.zones, show_default=True, help="Zones of a graph."
+    ),
+    click.option(
+        "--edge-cost",
+        default=RunConfig.edge_cost,
+        show_default=True,
+        help="What makes a path over zones short: product or normalized.",
+    ),
+    click.option(
+        "--seed", type=int, default=RunConfig.seed, show_default=True, help="Seed of the parameters and the episodes."
+    ),
+    click.option(
+        "--learning-rate",
+        type=float,
+        help="Adam's step size at the start; falls linearly to 0 over the budget.  "
+        "[default: 0.001 compact, 0.0001 paper]",
+    ),
+    click.option(
+        "--max-lag",
+        type=int,
+        default=RunConfig.max_lag,
+        show_default=True,
+        help="Largest policy lag of a gradient that is applied, parameter versions.",
+    ),
+)
+
+
+def run_options(command: F) -> F:
+    """Give a command the options of a run's configuration; it takes them as keywords, for `run_config`."""
+    for option in reversed(_OPTIONS):
+        command = option(command)
+    return command
+
+
+def run_config(choices: Mapping[str, Any]) -> RunConfig:
+    """Return the configuration that the options say.
+
+    Args:
+        choices: Values of the options, and ``minutes`` and ``frames``.
+
+    Raises:
+        HozError: A value does not exist or is out of range, or the encoder cannot be loaded.
+    """
+    from hoz_dist.policy.encoders import load_encoder
+
+    values = dict(choices)
+    weights: Path | None = values.pop("weights")
+    learning_rate: float | None = values.pop("learning_rate")
+    config = RunConfig(**values)  # checks the names before they are used below
+    encoder = load_encoder(config.encoder, weights)
+    return replace(
+        config,
+        learning_rate=PRESET_LEARNING_RATES[config.preset] if learning_rate is None else learning_rate,
+        encoder_key=encoder.key,
+        channels=encoder.channels,
+    )
+
+
+def as_arguments(choices: Mapping[str, Any]) -> list[str]:
+    """Return options as words of a command line; those without a value are left out."""
+    words: list[str] = []
+    for name, value in choices.items():
+        option = "--model" if name == "method" else f"--{name.replace('_', '-')}"
+        for single in value if isinstance(value, tuple) else (value,):
+            words += [] if single is None else [option, str(single)]
+    return words
