@@ -21,13 +21,6 @@ from hoz_dist.policy.recurrent import EpisodicLSTM
 from hoz_dist.policy.settings import PolicySettings
 from hoz_dist.policy.trunks import make_trunk
 
-MOVE_BIAS = 1.5
-"""Bias of the other actions' logits over Done's at the start.
-
-Done at once is a local optimum: it costs one step, wandering costs many. With the done reminder it is hard to leave,
-since Done's logit is 0 while the target is not seen and cannot be pushed down. So training starts where Done is rare.
-"""
-
 
 class State(NamedTuple):
     """Recurrent state of B episodes."""
@@ -96,7 +89,11 @@ class _Inputs(NamedTuple):
 
 
 class ActorCritic(nn.Module):
-    """Policy and value function."""
+    """Policy and value function.
+
+    Args:
+        settings: What shapes the network.
+    """
 
     def __init__(self, settings: PolicySettings) -> None:
         super().__init__()
@@ -117,9 +114,9 @@ class ActorCritic(nn.Module):
         self.critic = nn.Linear(sizes.lstm, 1)
         self.done_reminder = DoneReminder() if settings.done_reminder else None
         with torch.no_grad():
+            # Start near the uniform policy.
             self.actor.weight.mul_(0.1)
-            self.actor.bias.fill_(MOVE_BIAS)
-            self.actor.bias[Action.DONE] = 0.0
+            self.actor.bias.zero_()
 
     def initial_state(self, batch: int) -> State:
         """Return the state before any episode's first step."""

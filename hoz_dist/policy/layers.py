@@ -15,9 +15,14 @@ class ObjectLayer(nn.Module):
 
     Deviation from the paper: f^v is extended by the confidence, so that the embedding of a seen object also reaches the
     policy when its appearance is near zero (the pooled encoder's features are centred).
+
+    Args:
+        categories: N.
+        features: D_o, columns of W_o.
     """
 
     GATE: Final = 3.0
+    """How firmly the gating columns of W_o shut off other objects than the target at the start; boxes are in [0, 1]."""
 
     def __init__(self, categories: int, features: int) -> None:
         super().__init__()
@@ -49,7 +54,12 @@ class ObjectLayer(nn.Module):
 
 
 class ZoneLayer(nn.Module):
-    """Zone embedding H_z = relu(E_hat delta_t W_z) with online update [Eq. 4, 5]; the policy gets H_z' Z_sub."""
+    """Zone embedding H_z = relu(E_hat delta_t W_z) with online update [Eq. 4, 5]; the policy gets H_z' Z_sub.
+
+    Args:
+        categories: N.
+        features: D_z, columns of W_z.
+    """
 
     def __init__(self, categories: int, features: int) -> None:
         super().__init__()
@@ -94,7 +104,13 @@ class ZoneLayer(nn.Module):
 
 
 class SceneLayer(nn.Module):
-    """Tells which scene the agent is in, from picture and detections."""
+    """Tells which scene the agent is in, from picture and detections.
+
+    Args:
+        picture: F, the number of picture features.
+        categories: N.
+        scenes: S.
+    """
 
     def __init__(self, picture: int, categories: int, scenes: int) -> None:
         super().__init__()

@@ -18,6 +18,13 @@ class FlatParameters:
 
     Parameters keep the order of ``module.parameters()``. The module's tensors become views of `values` and
     `gradients`: changing one changes the other.
+
+    Args:
+        module: The network; it must not get other parameters later.
+
+    Attributes:
+        values: All parameters, float32 [P].
+        gradients: Their gradients, float32 [P]; set them to zero in place before each backward pass.
     """
 
     def __init__(self, module: nn.Module) -> None:

@@ -9,6 +9,11 @@ class EpisodicLSTM(nn.Module):
 
     ``nn.LSTM`` cannot reset its state in mid-sequence. Here the input's share of the gates is computed for the whole
     sequence in one product, and only the recurrent share step by step.
+
+    Args:
+        inputs: Number of input features.
+        cells: Cells of a layer.
+        layers: Number of layers.
     """
 
     def __init__(self, inputs: int, cells: int, layers: int) -> None:

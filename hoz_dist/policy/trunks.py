@@ -8,7 +8,16 @@ from hoz_dist.policy.settings import PolicySettings
 
 
 class VectorTrunk(nn.Module):
-    """Every input is a vector; they are concatenated."""
+    """Every input is a vector; they are concatenated.
+
+    Args:
+        settings: What shapes the network.
+        context: X, the sum of the sizes of all vector inputs.
+
+    Attributes:
+        features: Size of the output.
+        picture_features: F, size of what the scene layer sees of the picture.
+    """
 
     def __init__(self, settings: PolicySettings, context: int) -> None:
         super().__init__()
@@ -43,7 +52,10 @@ class VectorTrunk(nn.Module):
 
 
 class GridTrunk(nn.Module):
-    """Every input is a map over the 7 x 7 grid; pointwise convolutions join them to 64 x 7 x 7 features."""
+    """Every input is a map over the 7 x 7 grid; pointwise convolutions join them to 64 x 7 x 7 features.
+
+    Arguments and attributes are those of `VectorTrunk`.
+    """
 
     def __init__(self, settings: PolicySettings, context: int) -> None:
         super().__init__()
