@@ -85,7 +85,7 @@ class LazyGroup(click.Group):
 def cli() -> None:
     """Train object-goal navigation over Zenoh, guided by hierarchical object-to-zone graphs.
 
-    Try first: hoz-dist train --minutes 8
+    Try first: hoz-dist train
     """
 
 
@@ -96,7 +96,9 @@ def main() -> None:
     on standard error, 130 when interrupted, by SIGTERM too: it ends a command as Ctrl-C does, by way of the `with`
     statements that stop its children.
     """
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    # SIGINT too: a shell script starts background commands with it ignored, and Python leaves it so.
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.default_int_handler)
     sys.exit(run(sys.argv[1:]))
 
 
