@@ -1,0 +1,153 @@
+"""Parameters and graphs on their way to those who follow them."""
+
+import threading
+
+import numpy as np
+import pytest
+
+from hoz_dist.errors import ConnectionFailedError
+from hoz_dist.wire.ask import ask
+from hoz_dist.wire.codec import decode
+from hoz_dist.wire.liveliness import Members
+from hoz_dist.wire.messages import (
+    ParametersHead,
+    SceneGraphReply,
+)
+from hoz_dist.wire.parameters import SHARD_ELEMENTS, ParametersFollower, ParametersPublisher
+from hoz_dist.wire.publishing import NewestSubscriber
+from hoz_dist.wire.server import Server
+from hoz_dist.wire.session import Session, open_client, open_router
+from hoz_dist.wire.snapshots import Snapshots
+from tests import wire_samples as samples
+from tests.integration.wire.pushing import KEYS, WAIT_S, until
+
+pytestmark = pytest.mark.integration
+
+
+def test_graphs_are_served_from_the_first_question_on(endpoint: str) -> None:
+    snapshots = Snapshots(samples.config_reply(), samples.status_reply, "product")
+    with open_router(endpoint) as session, Server(session, KEYS, snapshots, graphs=[samples.scene_graph()]):
+        assert set(snapshots.graphs) == {"kitchen"}
+        with open_client(endpoint) as client:
+            (answer,) = ask(client, KEYS.graph("kitchen"), timeout_s=5.0)
+            assert decode(answer.payload, SceneGraphReply).version == 2
+
+
+def test_parameters_that_suffice_and_are_the_newest_are_not_fetched_again(learner: Server, client: Session) -> None:
+    with ParametersFollower(client, KEYS, threading.Event()) as follower:
+        with ParametersPublisher(learner.session, KEYS) as publisher:
+            publisher.publish(1, 4, np.ones(3, np.float32))
+            fetched = follower.fetch(timeout_s=WAIT_S)
+            assert until(lambda: follower.newest is not None)
+        # Nobody serves them any more.
+        assert follower.fetch((1, 4), timeout_s=0.2) is fetched
+        for at_least in (None, (1, 5)):
+            with pytest.raises(ConnectionFailedError):
+                follower.fetch(at_least, timeout_s=0.2)
+
+
+def test_a_follower_gets_the_newest_parameters(learner: Server, client: Session, endpoint: str) -> None:
+    vector = np.arange(1000, dtype=np.float32)
+    with (
+        ParametersFollower(client, KEYS, threading.Event()) as early,
+        ParametersPublisher(learner.session, KEYS) as publisher,
+    ):
+        publisher.publish(1, 0, vector)
+        first = early.fetch(timeout_s=WAIT_S)
+        assert first.head.stamp == (1, 0)
+        np.testing.assert_array_equal(first.vector, np.arange(1000))
+        vector += 1  # the learner's own array goes on, what it published does not
+        np.testing.assert_array_equal(early.fetch(timeout_s=WAIT_S).vector, np.arange(1000))
+        head = publisher.publish(1, 1, vector)
+        assert until(lambda: early.newest is not None and early.newest.stamp == (1, 1))
+        np.testing.assert_array_equal(early.fetch((1, 1), WAIT_S).vector, np.arange(1000) + 1)
+        with open_client(endpoint) as other, ParametersFollower(other, KEYS, threading.Event()) as late:
+            assert until(lambda: late.newest is not None and late.newest.digest == head.digest), "late joiners know"
+        (answer,) = ask(client, KEYS.params, timeout_s=5.0)
+        assert decode(answer.payload, ParametersHead).digest == head.digest
+
+
+def test_parameters_of_several_shards_are_never_mixed(learner: Server, client: Session) -> None:
+    stop = threading.Event()
+    size = 2 * SHARD_ELEMENTS + 5
+    with (
+        ParametersFollower(client, KEYS, threading.Event()) as follower,
+        ParametersPublisher(learner.session, KEYS) as publisher,
+    ):
+        publisher.publish(1, 0, np.zeros(size, np.float32))
+
+        def train() -> None:
+            version = 0
+            while not stop.is_set():
+                version += 1
+                publisher.publish(1, version, np.full(size, version, np.float32))
+
+        thread = threading.Thread(target=train)
+        thread.start()
+        stamps = []
+        for _ in range(8):
+            fetched = follower.fetch(timeout_s=WAIT_S)
+            stamps.append(fetched.head.stamp)
+            assert fetched.head.shards == 3
+            assert (fetched.vector == fetched.head.version).all()
+        stop.set()
+        thread.join(WAIT_S)
+    assert stamps == sorted(stamps)
+
+
+def test_parameters_never_run_backwards_but_a_new_epoch_may_begin_lower(learner: Server, client: Session) -> None:
+    with (
+        ParametersFollower(client, KEYS, threading.Event()) as follower,
+        ParametersPublisher(learner.session, KEYS) as publisher,
+    ):
+        publisher.publish(2, 9, np.ones(3, np.float32))
+        assert follower.fetch(timeout_s=WAIT_S).head.stamp == (2, 9)
+        for older in ((2, 8), (1, 50)):
+            publisher.publish(*older, np.zeros(3, np.float32))
+            with pytest.raises(ConnectionFailedError, match="did not serve parameters"):
+                follower.fetch(timeout_s=0.2)
+            assert follower.newest is not None
+            assert follower.newest.stamp == (2, 9)
+        publisher.publish(3, 4, np.full(3, 7, np.float32))
+        assert follower.fetch(timeout_s=WAIT_S).head.stamp == (3, 4)
+
+
+def test_a_follower_hears_of_the_new_epoch_of_a_restarted_learner(endpoint: str) -> None:
+    with samples.serving(endpoint) as (_, session), ParametersPublisher(session, KEYS) as publisher:
+        client = open_client(endpoint)
+        follower = ParametersFollower(client, KEYS, threading.Event())
+        publisher.publish(1, 7, np.zeros(3, np.float32))
+        assert until(lambda: follower.newest is not None)
+    with client, follower, samples.serving(endpoint) as (_, session), ParametersPublisher(session, KEYS) as publisher:
+        publisher.publish(2, 3, np.ones(3, np.float32))
+        assert until(lambda: follower.newest is not None and follower.newest.stamp == (2, 3))
+        np.testing.assert_array_equal(follower.fetch((2, 0), WAIT_S).vector, np.ones(3))
+
+
+def test_graphs_are_published_when_they_change(learner: Server, client: Session) -> None:
+    with NewestSubscriber(client, KEYS.graph("*"), SceneGraphReply) as graphs:
+        learner.put_graph(samples.scene_graph(version=1))
+        learner.put_graph(samples.room_graph())
+        key = KEYS.graph("kitchen")
+        assert graphs.wait_for(lambda newest: key in newest, WAIT_S)
+        learner.put_graph(samples.scene_graph(version=2))
+        assert graphs.wait_for(lambda newest: newest[key].version == 2, WAIT_S)
+        assert set(graphs.newest) == {key}, "room graphs have keys of their own"
+        with NewestSubscriber(client, KEYS.graph("*"), SceneGraphReply) as late:
+            assert late.wait_for(lambda newest: key in newest and newest[key].version == 2, WAIT_S)
+
+
+def test_no_thread_and_no_session_is_left_behind(endpoint: str) -> None:
+    before = set(threading.enumerate())
+    with samples.serving(endpoint) as (server, session), open_client(endpoint) as client:
+        with (
+            ParametersPublisher(session, KEYS) as publisher,
+            ParametersFollower(client, KEYS, threading.Event()) as follower,
+            Members(session, KEYS),
+        ):
+            publisher.publish(1, 0, np.zeros(3, np.float32))
+            follower.fetch(timeout_s=WAIT_S)
+        server.put_graph(samples.scene_graph())
+    assert session.is_closed()
+    assert client.is_closed()
+    assert set(threading.enumerate()) == before
