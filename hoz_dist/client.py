@@ -10,9 +10,9 @@ It needs neither a learning library nor a simulator, and starts in a fraction of
 import threading
 from collections.abc import Sequence
 from contextlib import ExitStack
-from types import TracebackType
-from typing import Any, Final, Self, TypeVar
+from typing import Any, Final, TypeVar
 
+from hoz_dist.closing import Closing
 from hoz_dist.errors import ConnectionFailedError, HozError, InvalidValueError, NotFoundError, UnknownNameError
 from hoz_dist.graph.planner import Plan
 from hoz_dist.graph.room_graph import RoomGraph
@@ -50,7 +50,7 @@ _ERRORS: Final[dict[str, type[HozError]]] = {
 M = TypeVar("M", bound=Message)
 
 
-class HozClient:
+class HozClient(Closing):
     """Asks the learner of a run. Use it in a ``with`` statement; its methods may be called from several threads.
 
     Args:
@@ -144,14 +144,6 @@ class HozClient:
     def close(self) -> None:
         """Close the session."""
         self._open.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def _keys_of_run(self) -> Keys:
         """Return the keys of the run, which is looked for when it is first needed."""

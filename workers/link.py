@@ -6,12 +6,12 @@ import threading
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
-from types import TracebackType
-from typing import Final, Self
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hoz_dist.closing import Closing
 from hoz_dist.config import RunConfig
 from hoz_dist.errors import ConnectionFailedError, HozError
 from hoz_dist.graph.room_graph import RoomGraph
@@ -49,7 +49,7 @@ FETCH_S: Final = 10.0
 """How long to wait for parameters before looking whether the run is still the same, seconds."""
 
 
-class LearnerLink:
+class LearnerLink(Closing):
     """What an actor says to its learner, and hears from it. Use it in a ``with`` statement.
 
     Every push blocks until the learner has acknowledged it, however long the learner is away.
@@ -96,12 +96,8 @@ class LearnerLink:
             )
             self._open = stack.pop_all()
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def close(self) -> None:
+        """Leave the run."""
         self._open.close()
 
     def parameters(self, at_least: tuple[int, int] | None = None) -> Parameters:

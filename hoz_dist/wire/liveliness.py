@@ -1,13 +1,13 @@
 """Membership: who holds a live token. A killed process loses its token within milliseconds."""
 
 import logging
-from types import TracebackType
-from typing import Final, NamedTuple, Self
+from typing import Final, NamedTuple
 
 import zenoh
 from zenoh import LivelinessToken, Session
 from zenoh.handlers import FifoChannel
 
+from hoz_dist.closing import Closing
 from hoz_dist.wire.draining import Drain
 from hoz_dist.wire.keys import NAME_PATTERN, Keys, check_name
 
@@ -35,7 +35,7 @@ def declare_alive(session: Session, keys: Keys, member: Member) -> LivelinessTok
     return session.liveliness().declare_token(key)
 
 
-class Members:
+class Members(Closing):
     """Follows who takes part in a run.
 
     Args:
@@ -56,14 +56,6 @@ class Members:
     def close(self) -> None:
         """Stop watching."""
         self._drain.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def _follow(self, change: zenoh.Sample) -> None:
         role, name = str(change.key_expr).split("/")[-2:]

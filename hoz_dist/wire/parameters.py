@@ -5,14 +5,14 @@ One query for all shards is answered from one version, so that a fetch never mix
 
 import logging
 import threading
-from types import TracebackType
-from typing import Final, NamedTuple, Self
+from typing import Final, NamedTuple
 
 import numpy as np
 import xxhash
 from numpy.typing import NDArray
 from zenoh import KeyExpr, Query, Session
 
+from hoz_dist.closing import Closing
 from hoz_dist.errors import ConnectionFailedError
 from hoz_dist.wire.ask import Answer, ask
 from hoz_dist.wire.codec import decode, encode
@@ -44,7 +44,7 @@ def head_of(epoch: int, version: int, vector: NDArray[np.float32]) -> Parameters
     return ParametersHead(epoch, version, digest, len(vector), -(-len(vector) // SHARD_ELEMENTS))
 
 
-class ParametersPublisher:
+class ParametersPublisher(Closing):
     """Publishes the head of the newest parameters and serves their shards.
 
     Args:
@@ -78,14 +78,6 @@ class ParametersPublisher:
         self._queryable.close()
         self._publisher.close()
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
-
     def _answer(self, query: Query) -> None:
         """Reply with the head, or with all shards that the query selects."""
         newest = self._newest
@@ -101,7 +93,7 @@ class ParametersPublisher:
                     query.reply(key, encode(ParametersShard(newest.head, shard, values)))
 
 
-class ParametersFollower:
+class ParametersFollower(Closing):
     """Knows the newest head and fetches parameters; they never run backwards.
 
     Args:
@@ -170,14 +162,6 @@ class ParametersFollower:
     def close(self) -> None:
         """Stop following."""
         self._subscriber.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
 
 def assemble(answers: list[Answer]) -> Parameters | None:

@@ -6,8 +6,7 @@ that missed it, or comes back after the network was away, gets it all the same.
 
 import threading
 from collections.abc import Callable, Mapping
-from types import TracebackType
-from typing import Final, Generic, Self, TypeVar
+from typing import Final, Generic, TypeVar
 
 import zenoh
 from zenoh import CongestionControl, Priority, Session
@@ -21,6 +20,7 @@ from zenoh.ext import (
 )
 from zenoh.handlers import FifoChannel
 
+from hoz_dist.closing import Closing
 from hoz_dist.wire.codec import decode, encode
 from hoz_dist.wire.draining import Drain
 from hoz_dist.wire.messages import Message
@@ -61,7 +61,7 @@ class NewestPublisher:
         self._publisher.undeclare()  # type: ignore[no-untyped-call]
 
 
-class NewestSubscriber(Generic[M]):
+class NewestSubscriber(Closing, Generic[M]):
     """Keeps the newest message of each key.
 
     Args:
@@ -101,14 +101,6 @@ class NewestSubscriber(Generic[M]):
     def close(self) -> None:
         """Stop following."""
         self._drain.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def _keep(self, sample: zenoh.Sample) -> None:
         key = str(sample.key_expr)

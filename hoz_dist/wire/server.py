@@ -6,11 +6,10 @@ spot from snapshots. Whatever is wrong with a message, the thread lives on and t
 """
 
 from collections.abc import Callable, Iterable
-from types import TracebackType
-from typing import Self
 
 from zenoh import KeyExpr, Query, Session, ZBytes
 
+from hoz_dist.closing import Closing
 from hoz_dist.errors import HozError
 from hoz_dist.graph.room_graph import RoomGraph
 from hoz_dist.graph.scene_graph import SceneGraph
@@ -26,7 +25,7 @@ from hoz_dist.wire.rejections import Rejections
 from hoz_dist.wire.snapshots import GraphReply, Snapshots
 
 
-class Server:
+class Server(Closing):
     """Serves a run on a session.
 
     Args:
@@ -89,14 +88,6 @@ class Server:
             queryable.close()
         for publisher in self._publishers.values():
             publisher.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def _receive(self, query: Query, expected: type[Push]) -> None:
         """Check a push, and let it wait for the learner."""
