@@ -108,8 +108,8 @@ class EpisodesPush(Push):
 
 
 @dataclass(frozen=True, eq=False)
-class RoomGraphPush(Push):
-    """A room graph.
+class RoomGraphFields(Structure):
+    """What a room graph holds, pushed or served.
 
     Attributes:
         room: The room.
@@ -119,7 +119,6 @@ class RoomGraphPush(Push):
         edges: [K, K] f64 zone edges, in [0, 1].
     """
 
-    KIND: ClassVar[str] = "room_graph_push"
     MOST_BYTES: ClassVar[int] = _GRAPH
 
     room: Annotated[RoomId, _ROOM]
@@ -131,6 +130,13 @@ class RoomGraphPush(Push):
     def __post_init__(self) -> None:
         super().__post_init__()
         _check_graph(self.nodes, self.edges, self.categories)
+
+
+@dataclass(frozen=True, eq=False)
+class RoomGraphPush(RoomGraphFields, Push):
+    """A room graph that an actor has made."""
+
+    KIND: ClassVar[str] = "room_graph_push"
 
 
 @dataclass(frozen=True, eq=False)
@@ -255,21 +261,10 @@ class SceneGraphReply(Message):
 
 
 @dataclass(frozen=True, eq=False)
-class RoomGraphReply(Message):
-    """A room graph; the fields are those of `RoomGraphPush`."""
+class RoomGraphReply(RoomGraphFields, Message):
+    """A room graph that the learner serves."""
 
     KIND: ClassVar[str] = "room_graph"
-    MOST_BYTES: ClassVar[int] = _GRAPH
-
-    room: Annotated[RoomId, _ROOM]
-    digest: Annotated[str, _DIGEST]
-    categories: Annotated[tuple[str, ...], _CATEGORIES]
-    nodes: Annotated[NDArray[np.float64], _NODES]
-    edges: Annotated[NDArray[np.float64], _EDGES]
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        _check_graph(self.nodes, self.edges, self.categories)
 
 
 @dataclass(frozen=True, eq=False)
