@@ -193,7 +193,7 @@ class LearnerCore:
             yield self._refuse(request, *refusal)
             return
         if self._schedule is not None and self._schedule.turn(push.actor, push.sequence) == "later":
-            yield Reply(request, Busy())
+            yield Reply(request, Busy(self.epoch))
             return
         yield from self._apply(sender, push, now)
         yield PublishParameters()
@@ -282,9 +282,8 @@ class LearnerCore:
         self.statistics.duplicates += 1
         return Reply(request, self._accepted())
 
-    @staticmethod
-    def _refuse(request: int, reason: Reason, detail: str) -> Reply:
-        return Reply(request, Refused(reason.value, detail))
+    def _refuse(self, request: int, reason: Reason, detail: str) -> Reply:
+        return Reply(request, Refused(reason.value, detail, self.epoch))
 
     def _accepted(self) -> Accepted:
         return Accepted(self.epoch, self.version)

@@ -7,6 +7,7 @@ in this thread and written in another. A disk that fails is said once in the log
 
 import json
 import logging
+import secrets
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -24,11 +25,12 @@ from hoz_dist.policy.parameters import initial_parameters
 from hoz_dist.sim.catalogue import CATALOGUE_PATH
 from hoz_dist.wire.inbox import Request
 from hoz_dist.wire.keys import Keys
-from hoz_dist.wire.liveliness import Member, Members, declare_alive
+from hoz_dist.wire.liveliness import Departure, Member, Members, declare_alive, host_name
 from hoz_dist.wire.messages import (
     ConfigReply,
     EpisodesPush,
     GradientPush,
+    LeftProcess,
     ProcessStatus,
     Refused,
     RoomGraphPush,
@@ -153,7 +155,7 @@ class Learner:
             self._server = stack.enter_context(
                 Server(session, keys, snapshots, rejections=self._rejections, graphs=graphs)
             )
-            stack.enter_context(declare_alive(session, keys, Member(NAME, NAME)))
+            stack.enter_context(declare_alive(session, keys, Member(NAME, NAME, host_name(), secrets.randbits(48))))
             self._open = stack.pop_all()
 
     def __enter__(self) -> Self:
@@ -191,6 +193,7 @@ class Learner:
                 _process_status(member, actors.get(member.id, {}), rejected.get(member.id, 0))
                 for member in self._members.current()
             ),
+            left=tuple(_left_process(departure) for departure in self._members.left()),
             rejected=self._rejections.by_reason(),
             details={"run": self._name, **status},
         )
@@ -201,7 +204,9 @@ class Learner:
         except Exception:  # noqa: BLE001 - logged in full
             # Whatever a push manages to provoke must not stop the training, here and after each restart.
             _log.exception("failed to handle a push of %s", request.message.actor)
-            request.answer(Refused(Reason.INTERNAL.value, "the learner failed to handle the push; see its log"))
+            request.answer(
+                Refused(Reason.INTERNAL.value, "the learner failed to handle the push; see its log", self._core.epoch)
+            )
         else:
             self._carry_out(effects, request, now)
 
@@ -296,12 +301,18 @@ def _process_status(member: Member, actor: dict[str, Any], rejected: int) -> Pro
     return ProcessStatus(
         role=member.role,
         id=member.id,
+        host=member.host,
+        incarnation=member.incarnation,
         rooms=tuple(actor.get("rooms", ())),
         frames=actor.get("frames", 0),
         frames_per_second=actor.get("frames_per_second", 0.0),
         lag=actor.get("lag", 0.0),
         rejected=rejected,
     )
+
+
+def _left_process(departure: Departure) -> LeftProcess:
+    return LeftProcess(*departure.member, seconds=max(time.monotonic() - departure.time, 0.0))
 
 
 class _LogFile(logging.FileHandler):

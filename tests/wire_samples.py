@@ -18,6 +18,7 @@ from hoz_dist.wire.messages import (
     ConfigReply,
     EpisodesPush,
     GradientPush,
+    LeftProcess,
     Message,
     ParametersHead,
     ParametersShard,
@@ -63,9 +64,12 @@ def config_reply(epoch: int = 1) -> ConfigReply:
 
 
 def status_reply() -> StatusReply:
-    actor = ProcessStatus("actor", "a0", ("kitchen/3",), frames=800, frames_per_second=120.5, lag=1.5, rejected=1)
+    actor = ProcessStatus(
+        "actor", "a0", "h1", 77, ("kitchen/3",), frames=800, frames_per_second=120.5, lag=1.5, rejected=1
+    )
     details = {"frames": 800, "progress": 0.25, "success": {"overall": None, "scenes": {}}}
-    return StatusReply(5, 1, (actor, ProcessStatus("learner", "l0")), {"epoch": 1}, details)
+    processes = (actor, ProcessStatus("learner", "l0", "h2", 78))
+    return StatusReply(5, 1, processes, (LeftProcess("actor", "a1", "h1", 79, 2.5),), {"epoch": 1}, details)
 
 
 HEAD = ParametersHead(epoch=1, version=5, digest="0123456789abcdef", size=100, shards=1)
@@ -74,8 +78,8 @@ MESSAGES: tuple[Message, ...] = (
     EpisodesPush("a0", 77, 3, episodes=(EPISODE, EPISODE), policy_loss=-0.5, entropy=1.75),
     RoomGraphPush("a0", 77, 0, ROOM, "d1", TARGETS, *zone_graph()),
     Accepted(1, 5),
-    Busy(),
-    Refused("stale", "too old"),
+    Busy(1),
+    Refused("stale", "too old", 1),
     HEAD,
     ParametersShard(HEAD, 0, np.arange(100, dtype=np.float32)),
     config_reply(),

@@ -22,7 +22,7 @@ from hoz_dist.wire.ask import ask
 from hoz_dist.wire.codec import decode
 from hoz_dist.wire.discovery import find_run
 from hoz_dist.wire.keys import Keys
-from hoz_dist.wire.liveliness import Member, declare_alive
+from hoz_dist.wire.liveliness import Member, declare_alive, host_name
 from hoz_dist.wire.messages import (
     MAX_EPISODES,
     Accepted,
@@ -84,7 +84,9 @@ class LearnerLink(Closing):
         self._sequences: Counter[type[Push]] = Counter()
         self._pusher = Pusher(session, stop)
         with ExitStack() as stack:
-            stack.enter_context(declare_alive(session, self._keys, Member("actor", actor)))
+            stack.enter_context(
+                declare_alive(session, self._keys, Member("actor", actor, host_name(), self._incarnation))
+            )
             self._parameters = stack.enter_context(ParametersFollower(session, self._keys, stop))
             self._graphs = stack.enter_context(
                 NewestSubscriber(
@@ -201,7 +203,7 @@ class LearnerLink(Closing):
         )
         key = self._keys.graph(room.scene)
         for _ in range(GRAPH_TRIES):
-            reply = self._pusher.push(self._keys.room(room), push)
+            reply = self._pusher.push(self._keys.room(self._actor, room), push)
             if isinstance(reply, Refused):
                 return reply
             if self._graphs.wait_for(lambda newest: key in newest and room in newest[key].rooms, GRAPH_S):

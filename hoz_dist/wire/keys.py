@@ -33,6 +33,11 @@ def check_name(what: str, name: str) -> str:
     return name
 
 
+def sender_of(key: str) -> str:
+    """Return the actor that a push on a key comes from: ``hoz/{run}/{grads, rollouts or rooms}/{actor}/...``."""
+    return key.split("/")[3]
+
+
 def run_of(key: str) -> str:
     """Return the run that a concrete key belongs to."""
     return key.split("/")[1]
@@ -94,11 +99,11 @@ class Keys:
     @property
     def all_rooms(self) -> str:
         """Room graphs that actors push."""
-        return f"{ROOT}/{self.run}/rooms/*/*"
+        return f"{ROOT}/{self.run}/rooms/*/*/*"
 
-    def room(self, room: RoomId) -> str:
-        """The graph of one room that an actor pushes."""
-        return f"{ROOT}/{self.run}/rooms/{room}"
+    def room(self, actor: str, room: RoomId) -> str:
+        """The graph of one room that one actor pushes."""
+        return f"{ROOT}/{self.run}/rooms/{actor}/{room}"
 
     @property
     def all_graphs(self) -> str:
@@ -126,8 +131,8 @@ class Keys:
     @property
     def all_alive(self) -> str:
         """Liveliness tokens of every process."""
-        return self.alive("*", "*")
+        return f"{ROOT}/{self.run}/alive/*/*/*/*"
 
-    def alive(self, role: str, name: str) -> str:
+    def alive(self, role: str, name: str, host: str, incarnation: int) -> str:
         """Liveliness token of one process."""
-        return f"{ROOT}/{self.run}/alive/{role}/{name}"
+        return f"{ROOT}/{self.run}/alive/{role}/{name}/{host}/{incarnation}"

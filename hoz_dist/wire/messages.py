@@ -151,19 +151,28 @@ class Accepted(Message):
 
 @dataclass(frozen=True, eq=False)
 class Busy(Message):
-    """The learner has too much to do; push again after a while."""
+    """The learner of this epoch has too much to do; push again after a while."""
 
     KIND: ClassVar[str] = "busy"
+
+    epoch: Annotated[int, Int()]
 
 
 @dataclass(frozen=True, eq=False)
 class Refused(Message):
-    """The message does not count and must not be repeated; or the question cannot be answered."""
+    """The message does not count and must not be repeated; or the question cannot be answered.
+
+    Attributes:
+        reason: Why, by code.
+        detail: A sentence for people.
+        epoch: Epoch of the learner that says so; 0 when no learner said it.
+    """
 
     KIND: ClassVar[str] = "refused"
 
     reason: Annotated[str, OneOf(frozenset(Reason))]
     detail: Annotated[str, Text(2048)]
+    epoch: Annotated[int, Int()] = 0
 
 
 PushReply = Accepted | Busy | Refused
@@ -293,8 +302,10 @@ class ProcessStatus(Structure):
     """A process that holds a live token.
 
     Attributes:
-        role: ``learner`` or ``actor``.
+        role: ``learner``, ``standby`` or ``actor``.
         id: Its name.
+        host: Name of the machine that it runs on.
+        incarnation: Random number that it drew when it started; tells two processes of one name apart.
         rooms: Rooms that it trains in, as far as the learner knows.
         frames: Environment steps that it has contributed.
         frames_per_second: Its speed, as the learner measures it.
@@ -304,11 +315,32 @@ class ProcessStatus(Structure):
 
     role: Annotated[str, _NAME]
     id: Annotated[str, _NAME]
+    host: Annotated[str, _NAME]
+    incarnation: Annotated[int, Int()]
     rooms: Annotated[tuple[str, ...], Many(Text(64), 256)] = ()
     frames: Annotated[int, Int()] = 0
     frames_per_second: Annotated[float, Real(0.0)] = 0.0
     lag: Annotated[float, Real(0.0)] = 0.0
     rejected: Annotated[int, Int()] = 0
+
+
+@dataclass(frozen=True, eq=False)
+class LeftProcess(Structure):
+    """A process whose token is gone.
+
+    Attributes:
+        role: ``learner``, ``standby`` or ``actor``.
+        id: Its name.
+        host: Name of the machine that it ran on.
+        incarnation: Random number that it drew when it started.
+        seconds: How long ago its token went, seconds.
+    """
+
+    role: Annotated[str, _NAME]
+    id: Annotated[str, _NAME]
+    host: Annotated[str, _NAME]
+    incarnation: Annotated[int, Int()]
+    seconds: Annotated[float, Real(0.0)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -319,6 +351,7 @@ class StatusReply(Message):
         version: Version of the newest parameters.
         epoch: Epoch of the learner.
         processes: Holders of a live token.
+        left: Who held a token and does so no more, the last one first.
         rejected: Number of rejected messages by reason; reasons that never occurred are left out.
         details: More for people, what JSON can hold; none of its names is one of the above.
     """
@@ -329,6 +362,7 @@ class StatusReply(Message):
     version: Annotated[int, Int()]
     epoch: Annotated[int, Int()]
     processes: Annotated[tuple[ProcessStatus, ...], Many(Record(ProcessStatus), 4096)]
+    left: Annotated[tuple[LeftProcess, ...], Many(Record(LeftProcess), 256)]
     rejected: Annotated[dict[str, int], Counts()]
     details: Annotated[dict[str, Any], JsonObject()]
 

@@ -33,7 +33,7 @@ def answer(query: Query, key: str, message: Message) -> None:
             query.reply(key, encode(message))
 
 
-def refusal_of(error: HozError) -> Refused:
+def refusal_of(error: HozError, epoch: int) -> Refused:
     """Return the refusal that makes the asking side raise the same error; see `error_of`."""
     match error:
         case UnknownNameError():
@@ -42,7 +42,7 @@ def refusal_of(error: HozError) -> Refused:
             reason = Reason.NOT_FOUND
         case _:
             reason = Reason.MALFORMED
-    return Refused(reason.value, str(error)[:2048])
+    return Refused(reason.value, str(error)[:2048], epoch)
 
 
 def declare_queryable(session: Session, key_expr: str, handle: Callable[[Query], None]) -> Drain[Query]:

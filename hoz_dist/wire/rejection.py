@@ -26,6 +26,8 @@ class Reason(StrEnum):
     """A tensor has another shape than it should, or not the bytes that its shape needs."""
     NONFINITE = "nonfinite"
     """A number is NaN or infinite."""
+    NORM = "norm"
+    """A gradient's norm exceeds the bound of the run."""
     RANGE = "range"
     """A number is out of its range."""
     NAME = "name"

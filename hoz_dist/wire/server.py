@@ -16,7 +16,7 @@ from hoz_dist.graph.scene_graph import SceneGraph
 from hoz_dist.wire.codec import checksum, decode, encode
 from hoz_dist.wire.graphs import room_graph_reply, scene_graph_reply
 from hoz_dist.wire.inbox import Inbox, Request
-from hoz_dist.wire.keys import Keys
+from hoz_dist.wire.keys import Keys, sender_of
 from hoz_dist.wire.messages import Busy, EpisodesPush, GradientPush, Message, Push, Refused, RoomGraphPush
 from hoz_dist.wire.publishing import NewestPublisher
 from hoz_dist.wire.queryable import answer, declare_queryable, refusal_of
@@ -56,6 +56,7 @@ class Server(Closing):
         self.snapshots = snapshots
         self.session = session
         self._keys = keys
+        self._epoch = snapshots.config.epoch
         self._publishers: dict[str, NewestPublisher] = {}
         for graph in graphs:
             self.put_graph(graph)
@@ -96,14 +97,12 @@ class Server(Closing):
         try:
             message = self._checked(key, payload, query.attachment, expected)
         except RejectedError as error:
-            # The last part of the key is the actor's name, but of a room's it is a number.
-            sender = key if expected is RoomGraphPush else key.rpartition("/")[2]
-            self.rejections.count(error.reason, error.detail, sender)
-            answer(query, key, Refused(error.reason.value, error.detail[:2048]))
+            self.rejections.count(error.reason, error.detail, sender_of(key))
+            answer(query, key, Refused(error.reason.value, error.detail[:2048], self._epoch))
             return
         request = Request(query, message, len(payload), self.rejections)
         if not self.inbox.offer(request):
-            request.answer(Busy())
+            request.answer(Busy(self._epoch))
 
     def _checked(self, key: str, payload: bytes, attachment: ZBytes | None, expected: type[Push]) -> Push:
         """Return the message of a push.
@@ -126,7 +125,7 @@ class Server(Closing):
             case EpisodesPush():
                 return self._keys.rollouts(message.actor)
             case RoomGraphPush():
-                return self._keys.room(message.room)
+                return self._keys.room(message.actor, message.room)
             case _:  # pragma: no cover - every kind that is received stands above
                 raise TypeError(message)
 
@@ -135,7 +134,7 @@ class Server(Closing):
         prefix = self._keys.graph("")
         name = str(query.key_expr).removeprefix(prefix)
         if "*" not in name:
-            _answer_or_refuse(query, lambda: self.snapshots.graph(name))
+            self._answer_or_refuse(query, lambda: self.snapshots.graph(name))
             return
         with query:
             for name, graph in self.snapshots.graphs.items():
@@ -147,13 +146,12 @@ class Server(Closing):
         scene = str(query.key_expr).removeprefix(self._keys.plan(""))
         named = (part.partition("=") for part in str(query.parameters).split(";"))
         parameters = {name: value for name, _, value in named}
-        _answer_or_refuse(query, lambda: self.snapshots.plan(scene, parameters))
+        self._answer_or_refuse(query, lambda: self.snapshots.plan(scene, parameters))
 
-
-def _answer_or_refuse(query: Query, make: Callable[[], Message]) -> None:
-    """Answer a question, or say in one sentence what is wrong with it."""
-    try:
-        message = make()
-    except HozError as error:
-        message = refusal_of(error)
-    answer(query, str(query.key_expr), message)
+    def _answer_or_refuse(self, query: Query, make: Callable[[], Message]) -> None:
+        """Answer a question, or say in one sentence what is wrong with it."""
+        try:
+            message = make()
+        except HozError as error:
+            message = refusal_of(error, self._epoch)
+        answer(query, str(query.key_expr), message)

@@ -44,7 +44,7 @@ class FakeActor:
         self._keys, self._stop = Keys(run), threading.Event()
         with ExitStack() as stack:
             session = stack.enter_context(open_client(endpoint, timeout_s=DEADLINE_S))
-            stack.enter_context(declare_alive(session, self._keys, Member("actor", name)))
+            stack.enter_context(declare_alive(session, self._keys, Member("actor", name, "host", incarnation)))
             self._follower = stack.enter_context(ParametersFollower(session, self._keys, self._stop))
             self._pusher = Pusher(session, self._stop, attempt_s=2.0)
             self._open = stack.pop_all()
@@ -76,7 +76,7 @@ class FakeActor:
         push = RoomGraphPush(
             self.name, self.incarnation, sequence, room, graph.digest, TARGETS, graph.nodes, graph.edges
         )
-        return self._pusher.push(self._keys.room(room), push, DEADLINE_S)
+        return self._pusher.push(self._keys.room(self.name, room), push, DEADLINE_S)
 
 
 def gradient_for(parameters: Parameters, seed: int) -> NDArray[np.float32]:

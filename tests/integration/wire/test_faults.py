@@ -87,14 +87,14 @@ def test_members_are_the_holders_of_live_tokens(endpoint: str) -> None:
     with samples.serving(endpoint) as (_, session), Members(session, KEYS) as members:
         with open_client(endpoint) as first, open_client(endpoint) as second:
             tokens = [
-                declare_alive(first, KEYS, Member("actor", "a1")),
-                declare_alive(second, KEYS, Member("actor", "a0")),
+                declare_alive(first, KEYS, Member("actor", "a1", "h", 1)),
+                declare_alive(second, KEYS, Member("actor", "a0", "h", 2)),
             ]
-            assert until(lambda: members.current() == (("actor", "a0"), ("actor", "a1")))
+            assert until(lambda: members.current() == (("actor", "a0", "h", 2), ("actor", "a1", "h", 1)))
             with Members(first, KEYS) as late:
                 assert until(lambda: late.current() == members.current()), "a late watcher knows who came before"
             tokens[1].undeclare()  # type: ignore[no-untyped-call]
-            assert until(lambda: members.current() == (("actor", "a1"),))
+            assert until(lambda: members.current() == (("actor", "a1", "h", 1),))
         assert until(lambda: members.current() == ())
 
 
@@ -104,9 +104,9 @@ def test_tokens_with_strange_names_are_ignored(endpoint: str) -> None:
         Members(session, KEYS) as members,
         open_client(endpoint) as stranger,
     ):
-        strange = stranger.liveliness().declare_token(f"hoz/{KEYS.run}/alive/actor/a b;c")
-        with strange, declare_alive(stranger, KEYS, Member("actor", "a0")):
-            assert until(lambda: members.current() == (("actor", "a0"),))
+        strange = stranger.liveliness().declare_token(f"hoz/{KEYS.run}/alive/actor/a b;c/h/3")
+        with strange, declare_alive(stranger, KEYS, Member("actor", "a0", "h", 2)):
+            assert until(lambda: members.current() == (("actor", "a0", "h", 2),))
 
 
 def test_a_learner_that_is_away_is_said_once_and_so_is_its_return(

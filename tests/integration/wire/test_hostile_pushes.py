@@ -5,6 +5,7 @@ import threading
 import pytest
 import zenoh
 
+from hoz_dist.nav.rooms import RoomId
 from hoz_dist.wire.ask import ask
 from hoz_dist.wire.codec import decode, encode
 from hoz_dist.wire.messages import (
@@ -29,7 +30,7 @@ pytestmark = pytest.mark.integration
         (GRADS, encode(samples.MESSAGES[1]), None, "kind"),
         (KEYS.grads("a1"), encoded_gradient(0), None, "identity"),
         (KEYS.rollouts("a1"), encode(samples.MESSAGES[1]), None, "identity"),
-        (f"hoz/{KEYS.run}/rooms/kitchen/4", encode(samples.MESSAGES[2]), None, "identity"),
+        (KEYS.room("a0", RoomId("kitchen", 4)), encode(samples.MESSAGES[2]), None, "identity"),
         (KEYS.all_grads, encoded_gradient(0), None, "identity"),
     ],
 )
@@ -42,10 +43,10 @@ def test_a_bad_push_gets_one_answer_with_its_reason_and_is_counted(
     assert learner.inbox.take(0) is None
 
 
-def test_a_bad_push_of_a_room_is_counted_by_its_whole_key(learner: Server, client: Session) -> None:
-    key = KEYS.room(samples.ROOM)
+def test_a_bad_push_of_a_room_is_counted_for_its_actor(learner: Server, client: Session) -> None:
+    key = KEYS.room("a0", samples.ROOM)
     raw_push(client, key, b"")
-    assert learner.rejections.by_sender() == {key: 1}
+    assert learner.rejections.by_sender() == {"a0": 1}
 
 
 def test_a_push_damaged_on_the_way_is_sent_again(learner: Server, client: Session, endpoint: str) -> None:

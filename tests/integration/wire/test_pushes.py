@@ -37,7 +37,7 @@ def test_a_push_arrives_and_is_acknowledged(learner: Server, client: Session) ->
 
 
 def test_a_busy_learner_is_asked_again_until_it_takes_the_push(learner: Server, client: Session) -> None:
-    replies: Iterator[PushReply] = iter([Busy(), Busy(), Accepted(1, 6)])
+    replies: Iterator[PushReply] = iter([Busy(1), Busy(1), Accepted(1, 6)])
     with answering(learner.inbox, lambda _: next(replies)) as came:
         assert isinstance(push_to(client, samples.gradient_push(3)), Accepted)
     assert [push.sequence for push in came] == [3, 3, 3]
@@ -110,7 +110,7 @@ def test_a_stopped_process_does_not_wait_for_its_push(learner: Server, client: S
 
 
 def test_a_push_gives_up_at_its_deadline(learner: Server, client: Session) -> None:
-    with answering(learner.inbox, lambda _: Busy()), pytest.raises(ConnectionFailedError, match=r"within 0\.3 s"):
+    with answering(learner.inbox, lambda _: Busy(1)), pytest.raises(ConnectionFailedError, match=r"within 0\.3 s"):
         Pusher(client, threading.Event()).push(GRADS, samples.gradient_push(), deadline_s=0.3)
 
 

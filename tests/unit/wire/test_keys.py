@@ -13,11 +13,11 @@ def test_the_keys_are_those_of_the_protocol() -> None:
     assert keys.shard(2) == "hoz/night-3/params/2"
     assert keys.grads("a0") == "hoz/night-3/grads/a0"
     assert keys.rollouts("a0") == "hoz/night-3/rollouts/a0"
-    assert keys.room(RoomId("kitchen", 3)) == "hoz/night-3/rooms/kitchen/3"
+    assert keys.room("a0", RoomId("kitchen", 3)) == "hoz/night-3/rooms/a0/kitchen/3"
     assert keys.graph("kitchen/3") == "hoz/night-3/graphs/kitchen/3"
     assert keys.plan("kitchen") == "hoz/night-3/plan/kitchen"
     assert keys.status == "hoz/night-3/status"
-    assert keys.alive("actor", "a0") == "hoz/night-3/alive/actor/a0"
+    assert keys.alive("actor", "a0", "h", 7) == "hoz/night-3/alive/actor/a0/h/7"
 
 
 def test_wildcards_select_the_keys() -> None:
@@ -27,11 +27,11 @@ def test_wildcards_select_the_keys() -> None:
         (keys.shards, keys.shard(0)),
         (keys.all_grads, keys.grads("a0")),
         (keys.all_rollouts, keys.rollouts("a0")),
-        (keys.all_rooms, keys.room(RoomId("kitchen", 3))),
+        (keys.all_rooms, keys.room("a0", RoomId("kitchen", 3))),
         (keys.all_graphs, keys.graph("kitchen")),
         (keys.all_graphs, keys.graph("kitchen/3")),
         (keys.all_plans, keys.plan("bathroom")),
-        (keys.all_alive, keys.alive("actor", "a0")),
+        (keys.all_alive, keys.alive("actor", "a0", "h", 7)),
     ]
     for selector, key in pairs:
         assert zenoh.KeyExpr(selector).includes(zenoh.KeyExpr(key)), (selector, key)
