@@ -157,7 +157,7 @@ class LearnerCore:
                 for scene, graph in self.graphs.scenes.items()
             },
             "replay": self._replay_status(),
-            "actors": {name: actor.summary(now) for name, actor in statistics.actors.items()},
+            "actors": {process: actor.summary(now) for process, actor in statistics.actors.items()},
         }
 
     # --- what the shell tells ---
@@ -233,7 +233,7 @@ class LearnerCore:
         self._optimizer.step(push.gradient, gradient_norm(push.gradient), lag_weight(lag))
         self._seen.add(sender, push.sequence)
         self.version += 1
-        self.statistics.applied(push.actor, push.frames, lag, now)
+        self.statistics.applied(push.actor, push.incarnation, push.frames, lag, now)
         self._save_within(self._checkpoint_seconds, now)
         yield RecordUpdate(
             UpdateRecord(push.actor, push.incarnation, push.sequence, push.version, lag, self._optimizer.learning_rate)
@@ -246,7 +246,7 @@ class LearnerCore:
             yield self._repeated(event.request)
             return
         self._seen.add(sender, push.sequence)
-        actor = self.statistics.actor(push.actor, now)
+        actor = self.statistics.actor(push.actor, push.incarnation, now)
         self.statistics.losses = {name: getattr(push, name) for name in LOSS_TERMS}
         for episode in push.episodes:
             actor.rooms.add(str(episode.room))
@@ -270,7 +270,7 @@ class LearnerCore:
             yield self._refuse(request, Reason.RANGE, str(error))
             return
         self._seen.add(sender, push.sequence)
-        self.statistics.actor(push.actor, now).rooms.add(str(push.room))
+        self.statistics.actor(push.actor, push.incarnation, now).rooms.add(str(push.room))
         if not self.finished:
             self._clock.push(now)
         if changed:

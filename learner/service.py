@@ -25,13 +25,11 @@ from hoz_dist.policy.parameters import initial_parameters
 from hoz_dist.sim.catalogue import CATALOGUE_PATH
 from hoz_dist.wire.inbox import Request
 from hoz_dist.wire.keys import Keys
-from hoz_dist.wire.liveliness import Departure, Member, Members, declare_alive, host_name
+from hoz_dist.wire.liveliness import Member, Members, declare_alive, host_name
 from hoz_dist.wire.messages import (
     ConfigReply,
     EpisodesPush,
     GradientPush,
-    LeftProcess,
-    ProcessStatus,
     Refused,
     RoomGraphPush,
     StatusReply,
@@ -59,6 +57,7 @@ from learner.events import (
     SaveCheckpoint,
     Tick,
 )
+from learner.membership import left_processes, live_processes
 from learner.recorder import ScalarRecorder, UpdateLog
 from learner.replay import Schedule, read_updates
 from learner.run_folder import RunFolder, open_run_folder
@@ -189,11 +188,8 @@ class Learner:
         return StatusReply(
             version=status.pop("version"),
             epoch=status.pop("epoch"),
-            processes=tuple(
-                _process_status(member, actors.get(member.id, {}), rejected.get(member.id, 0))
-                for member in self._members.current()
-            ),
-            left=tuple(_left_process(departure) for departure in self._members.left()),
+            processes=live_processes(self._members, actors, rejected),
+            left=left_processes(self._members),
             rejected=self._rejections.by_reason(),
             details={"run": self._name, **status},
         )
@@ -295,24 +291,6 @@ def _event_of(request: Request) -> Event:
             return RoomGraphReceived(0, push)
         case push:
             raise TypeError(push)
-
-
-def _process_status(member: Member, actor: dict[str, Any], rejected: int) -> ProcessStatus:
-    return ProcessStatus(
-        role=member.role,
-        id=member.id,
-        host=member.host,
-        incarnation=member.incarnation,
-        rooms=tuple(actor.get("rooms", ())),
-        frames=actor.get("frames", 0),
-        frames_per_second=actor.get("frames_per_second", 0.0),
-        lag=actor.get("lag", 0.0),
-        rejected=rejected,
-    )
-
-
-def _left_process(departure: Departure) -> LeftProcess:
-    return LeftProcess(*departure.member, seconds=max(time.monotonic() - departure.time, 0.0))
 
 
 class _LogFile(logging.FileHandler):

@@ -50,7 +50,7 @@ class LagSummary(NamedTuple):
 
 @dataclass
 class ActorStatistics:
-    """What is known of one actor."""
+    """What is known of one actor process."""
 
     rooms: set[str] = field(default_factory=set)
     """Rooms that its episodes and room graphs were of."""
@@ -86,25 +86,27 @@ class Statistics:
         """Terms of the loss as an actor last reported them, by name."""
         self.duplicates = 0
         """Pushes that were sent again although they had counted, since the process started."""
-        self.actors: OrderedDict[str, ActorStatistics] = OrderedDict()
+        self.actors: OrderedDict[tuple[str, int], ActorStatistics] = OrderedDict()
+        """By name and incarnation: the speed of a process that left is not that of its successor."""
         self._lags: deque[int] = deque(maxlen=LAG_WINDOW)
         self._rate = Rate()
 
-    def actor(self, name: str, now: float) -> ActorStatistics:
-        """Return an actor's statistics and note that it was heard of now."""
-        statistics = self.actors.setdefault(name, ActorStatistics())
+    def actor(self, name: str, incarnation: int, now: float) -> ActorStatistics:
+        """Return the statistics of an actor process and note that it was heard of now."""
+        process = (name, incarnation)
+        statistics = self.actors.setdefault(process, ActorStatistics())
         statistics.last_seen = now
-        self.actors.move_to_end(name)
+        self.actors.move_to_end(process)
         if len(self.actors) > MAX_ACTORS:
             self.actors.popitem(last=False)
         return statistics
 
-    def applied(self, actor: str, frames: int, lag: int, now: float) -> None:
+    def applied(self, actor: str, incarnation: int, frames: int, lag: int, now: float) -> None:
         """Count an applied gradient."""
         self.frames += frames
         self._rate.add(now, frames)
         self._lags.append(lag)
-        statistics = self.actor(actor, now)
+        statistics = self.actor(actor, incarnation, now)
         statistics.frames += frames
         statistics.rate.add(now, frames)
         statistics.lags.append(lag)

@@ -4,8 +4,7 @@ import logging
 import re
 import socket
 import time
-from collections import deque
-from typing import Final, NamedTuple
+from typing import Final
 
 import zenoh
 from zenoh import LivelinessToken, Session
@@ -14,35 +13,17 @@ from zenoh.handlers import FifoChannel
 from hoz_dist.closing import Closing
 from hoz_dist.wire.draining import Drain
 from hoz_dist.wire.keys import NAME_PATTERN, Keys, check_name
+from hoz_dist.wire.roster import MOST_LIVE, Departure, Member, Roster
+from hoz_dist.wire.schema import MAX_INT
 
+__all__ = ["Departure", "Member", "Members", "declare_alive", "host_name"]
+
+MOST_LINES: Final = 100
+"""Log lines on members in `LINES_S`; strangers that come and go cannot fill the disk."""
+LINES_S: Final = 10.0
 _log = logging.getLogger(__name__)
-MOST_MEMBERS: Final = 4096
-"""So many are watched; invented tokens cannot fill the memory, or make the status too long to travel."""
-MOST_LEFT: Final = 64
-"""So many that left are remembered."""
 _PARTS: Final = 4
-_LARGEST_INCARNATION: Final = 2**63 - 1
-
-
-class Member(NamedTuple):
-    """A process that takes part in a run."""
-
-    role: str
-    """``learner``, ``standby`` or ``actor``."""
-    id: str
-    """Its name."""
-    host: str
-    """Name of the machine that it runs on, fit for a key."""
-    incarnation: int
-    """Random number that it drew when it started."""
-
-
-class Departure(NamedTuple):
-    """A process that left."""
-
-    member: Member
-    time: float
-    """When its token went, seconds of the monotonic clock."""
+_INCARNATION: Final = re.compile(r"0|[1-9][0-9]{0,18}")
 
 
 def host_name() -> str:
@@ -70,19 +51,20 @@ class Members(Closing):
     """
 
     def __init__(self, session: Session, keys: Keys) -> None:
-        self._members: frozenset[Member] = frozenset()
-        self._left: deque[Departure] = deque(maxlen=MOST_LEFT)
+        self._roster = Roster()
+        self._lines_since = float("-inf")
+        self._lines = 0
         # `history` reports the tokens that exist already; a get beside it would find none (measured).
         subscriber = session.liveliness().declare_subscriber(keys.all_alive, FifoChannel(1024), history=True)
         self._drain = Drain(subscriber, self._follow, "follows members")
 
     def current(self) -> tuple[Member, ...]:
         """Return who holds a token now, sorted."""
-        return tuple(sorted(self._members))
+        return self._roster.live()
 
     def left(self) -> tuple[Departure, ...]:
         """Return who held a token and left, the last one first; who came back is not among them."""
-        return tuple(reversed(self._left.copy()))
+        return self._roster.left()
 
     def close(self) -> None:
         """Stop watching."""
@@ -93,23 +75,30 @@ class Members(Closing):
         if member is None:
             return  # a stranger's token: none of our processes has such a key
         if change.kind == zenoh.SampleKind.PUT:
-            if len(self._members) >= MOST_MEMBERS:
-                _log.warning("%s %s is not watched: there are %d members already", *member[:2], MOST_MEMBERS)
-                return
-            self._left = deque((one for one in self._left if one.member != member), MOST_LEFT)
-            self._members |= {member}
-            _log.info("%s %s joined from %s", *member[:3])
-        elif member in self._members:
-            self._members -= {member}
-            self._left.append(Departure(member, time.monotonic()))
-            _log.info("%s %s left", *member[:2])
+            if self._roster.join(member):
+                self._say(logging.INFO, "%s %s joined from %s", *member[:3])
+            else:
+                self._say(logging.WARNING, "%s %s is not watched: there are too many like it", *member[:2])
+        elif self._roster.leave(member, time.monotonic()):
+            self._say(logging.INFO, "%s %s left", *member[:2])
+
+    def _say(self, level: int, line: str, *details: str) -> None:
+        """Log a line, unless there were too many."""
+        now = time.monotonic()
+        if now - self._lines_since > LINES_S:
+            self._lines_since, self._lines = now, 0
+        self._lines += 1
+        if self._lines <= MOST_LINES:
+            _log.log(level, line, *details)
+        elif self._lines == MOST_LINES + 1:
+            _log.warning("members come and go too fast to log each; the next %.0f s pass in silence", LINES_S)
 
 
 def _member_of(key: str) -> Member | None:
     """Return the process that a token belongs to; None when the key is not one of ours."""
     role, name, host, number = key.split("/")[-_PARTS:]
-    if not all(NAME_PATTERN.fullmatch(part) for part in (role, name, host)):
+    if role not in MOST_LIVE or not all(NAME_PATTERN.fullmatch(part) for part in (name, host)):
         return None
-    if not (number.isascii() and number.isdigit()) or int(number[:20]) > _LARGEST_INCARNATION:
+    if not _INCARNATION.fullmatch(number) or int(number) > MAX_INT:
         return None
     return Member(role, name, host, int(number))

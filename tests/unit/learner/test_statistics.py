@@ -37,10 +37,10 @@ def test_lag_is_summed_up() -> None:
     statistics = Statistics()
     assert statistics.lag() == LagSummary(0, 0.0, 0)
     for lag in (1, 3, 8):
-        statistics.applied("a", 20, lag, now=1.0)
+        statistics.applied("a", 7, 20, lag, now=1.0)
     assert statistics.lag() == LagSummary(1, 4.0, 8)
     assert statistics.frames == 60
-    assert statistics.actors["a"].summary(now=3.5) == {
+    assert statistics.actors["a", 7].summary(now=3.5) == {
         "rooms": [],
         "frames": 60,
         "frames_per_second": 24.0,
@@ -52,6 +52,15 @@ def test_lag_is_summed_up() -> None:
 def test_actors_are_forgotten_when_there_are_too_many() -> None:
     statistics = Statistics()
     for number in range(MAX_ACTORS + 1):
-        statistics.actor(f"a{number}", now=float(number))
+        statistics.actor(f"a{number}", 1, now=float(number))
     assert len(statistics.actors) == MAX_ACTORS
-    assert "a0" not in statistics.actors
+    assert ("a0", 1) not in statistics.actors
+
+
+def test_the_speed_of_a_process_is_not_that_of_its_predecessor() -> None:
+    statistics = Statistics()
+    statistics.applied("a", 7, 3000, lag=4, now=1.0)
+    statistics.applied("a", 8, 60, lag=0, now=2.0)
+    successor = statistics.actors["a", 8].summary(now=3.0)
+    assert (successor["frames"], successor["frames_per_second"], successor["lag"]) == (60, 60.0, 0.0)
+    assert statistics.frames == 3060
