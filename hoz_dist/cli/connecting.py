@@ -1,5 +1,7 @@
 """Options of the commands that connect to a learner."""
 
+from pathlib import Path
+
 import click
 
 from hoz_dist.wire.endpoint import DEFAULT_ENDPOINT
@@ -12,3 +14,9 @@ connect_option = click.option(
     help="Endpoint of the learner or of a router.",
 )
 run_option = click.option("--run", metavar="NAME", help="Name of the run.  [default: the only one that is found]")
+keys_option = click.option(
+    "--keys",
+    type=click.Path(path_type=Path),
+    metavar="FOLDER",
+    help="Folder with the keys of this process, made by `hoz-dist keys`.  [default: none, for tcp/ endpoints]",
+)

@@ -1,65 +1,87 @@
-"""Opening Zenoh sessions: the learner's, which is the router, and those of actors and queries, which are its clients.
+"""Opening Zenoh sessions: routers, of which a learner's session may be one, and their clients.
 
-The settings follow what was measured: no multicast (container networks have none), client mode (it reconnects and
-declares everything again by itself), retries from 200 ms to 2 s (the default takes 3.4 s to come back).
+With credentials a session speaks TLS, proves who it is, and makes the other side prove that the same authority knows
+it.
 """
 
 import json
 import re
 import threading
-from typing import Any, Final
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
 
 import zenoh
 from zenoh import Session
 
-from hoz_dist.errors import ConnectionFailedError
-from hoz_dist.wire.endpoint import check_endpoint
+from hoz_dist.errors import ConnectionFailedError, DamagedFileError, InvalidValueError, NotFoundError
+from hoz_dist.wire.endpoint import check_endpoint, is_encrypted
+from hoz_dist.wire.settings import CLIENT_LEASE_MS, client_settings, router_settings, tls_settings
 from hoz_dist.wire.waiting import Deadline, StoppedError
 
-__all__ = ["Session", "open_client", "open_router"]
+if TYPE_CHECKING:
+    # Reading certificates takes a tenth of a second to import, which only who has some needs to wait for.
+    from hoz_dist.wire.credentials import Credentials
+
+__all__ = ["Session", "is_connected", "open_client", "open_configured_router", "open_router"]
 
 CONNECT_TIMEOUT_S: Final = 2.0
 """How long opening waits for a router by default; it tries again and again within this time."""
 _ATTEMPT_S: Final = 2.0
 """How long Zenoh tries without a look at the stop event."""
-_COMMON: Final[dict[str, Any]] = {
-    "scouting/multicast/enabled": False,
-    "scouting/gossip/enabled": False,
-    "scouting/delay": 0,  # nothing is scouted for; a router would wait half a second for it all the same
-    # Plain bytes: implicit shared memory leaks segments of killed processes, and serves messages up to 16 MB only.
-    "transport/shared_memory/enabled": False,
-    # A receiver that stalls longer than this loses the transport, and with it what was in flight (5 s by default).
-    "transport/link/tx/queue/congestion_control/block/wait_before_close": 10_000_000,
-    "transport/link/rx/buffer_size": 4 * 1024 * 1024,
-    "transport/link/rx/max_message_size": 128 * 1024 * 1024,
-}
-_RETRY: Final = {"period_init_ms": 200, "period_max_ms": 2000, "period_increase_factor": 2}
 
 
-def open_router(listen: str) -> Session:
+def open_router(listen: str | Sequence[str], credentials: "Credentials | None" = None) -> Session:
     """Open a session that is a router: others connect to it. Use it in a ``with`` statement.
 
+    What the session itself sends and receives does not pass the access control.
+
     Args:
-        listen: Endpoint to listen at.
+        listen: Endpoint to listen at, or several.
+        credentials: Keys of a router, with its access control; None for a router that lets everybody in.
 
     Raises:
-        InvalidValueError: The endpoint is malformed.
-        ConnectionFailedError: The endpoint is in use, does not belong to this machine, or cannot be listened at.
+        InvalidValueError: An endpoint is malformed, or is none for the credentials.
+        NotFoundError: The key folder has no access control.
+        DamagedFileError: The access control cannot be read.
+        ConnectionFailedError: An endpoint is in use, does not belong to this machine, or cannot be listened at.
     """
-    settings = {
-        "mode": "router",
-        "listen/endpoints": [check_endpoint(listen)],
-        "listen/exit_on_failure": True,
-        "listen/timeout_ms": 0,
-    }
-    try:
-        return zenoh.open(_config(settings))
-    except zenoh.ZError as error:
-        message = f"Cannot listen at {listen}: {_reason(error)}; choose another endpoint with --listen."
-        raise ConnectionFailedError(message) from error
+    endpoints = [listen] if isinstance(listen, str) else list(listen)
+    for endpoint in endpoints:
+        _check_protection(check_endpoint(endpoint), credentials)
+    settings = router_settings() | {"listen/endpoints": endpoints}
+    if credentials is not None:
+        access_control = _read_config(credentials.router_file).get_json("access_control")
+        settings |= tls_settings(credentials) | {"access_control": json.loads(access_control)}
+    return _listen(_configured(zenoh.Config(), settings), ", ".join(endpoints))
 
 
-def open_client(connect: str, timeout_s: float = CONNECT_TIMEOUT_S, stop: threading.Event | None = None) -> Session:
+def open_configured_router(path: Path) -> Session:
+    """Open a router from a file, as `zenohd --config FILE` does. Use it in a ``with`` statement.
+
+    Args:
+        path: A configuration of Zenoh, JSON5.
+
+    Raises:
+        NotFoundError: The file does not exist.
+        DamagedFileError: It is no configuration of Zenoh.
+        InvalidValueError: It is not that of a router.
+        ConnectionFailedError: An endpoint is in use, does not belong to this machine, or cannot be listened at.
+    """
+    config = _read_config(path)
+    if json.loads(config.get_json("mode")) != "router":
+        message = f"'{path}' does not configure a router; it must say: mode: \"router\"."
+        raise InvalidValueError(message)
+    return _listen(config, f"the endpoints in '{path}'")
+
+
+def open_client(
+    connect: str,
+    timeout_s: float = CONNECT_TIMEOUT_S,
+    stop: threading.Event | None = None,
+    credentials: "Credentials | None" = None,
+    lease_ms: int = CLIENT_LEASE_MS,
+) -> Session:
     """Open a session as a client of a router. Use it in a ``with`` statement.
 
     Once open it survives the router: it reconnects by itself.
@@ -68,37 +90,80 @@ def open_client(connect: str, timeout_s: float = CONNECT_TIMEOUT_S, stop: thread
         connect: Endpoint of the router or of a learner.
         timeout_s: How long to wait for the router, seconds; it is tried again and again meanwhile.
         stop: Ends the wait early.
+        credentials: Keys of this process; None where no router asks for them.
+        lease_ms: Silence after which the router gives this process up, milliseconds.
 
     Raises:
-        InvalidValueError: The endpoint is malformed.
-        ConnectionFailedError: No router answers in time.
+        InvalidValueError: The endpoint is malformed, or is none for the credentials.
+        ConnectionFailedError: No router answers in time, or the router and we do not accept each other's keys.
         StoppedError: The stop event was set.
     """
     endpoint, deadline = check_endpoint(connect), Deadline(timeout_s)
+    _check_protection(endpoint, credentials)
+    settings = client_settings(lease_ms) | {"connect/endpoints": [endpoint]}
+    if credentials is not None:
+        settings |= tls_settings(credentials)
     while True:
+        # Zenoh cannot be told to stop meanwhile, and is not interrupted by signals.
         attempt_ms = max(round(deadline.within(_ATTEMPT_S) * 1000), 1)
         try:
-            return _open_client(endpoint, attempt_ms)
+            return zenoh.open(_configured(zenoh.Config(), settings | {"connect/timeout_ms": attempt_ms}))
         except zenoh.ZError as error:
             if stop is not None and stop.is_set():
                 raise StoppedError from error
             if deadline.passed:
-                message = (
-                    f"No learner or router answers at {connect}; "
-                    "start one with `hoz-dist learner --listen ...` or check the address."
-                )
-                raise ConnectionFailedError(message) from error
+                raise ConnectionFailedError(_nobody_answers(connect, credentials)) from error
 
 
-def _open_client(endpoint: str, timeout_ms: int) -> Session:
-    """Open a client's session; Zenoh cannot be told to stop meanwhile, and is not interrupted by signals."""
-    settings = {
-        "mode": "client",
-        "connect/endpoints": [endpoint],
-        "connect/timeout_ms": timeout_ms,
-        "connect/retry": _RETRY,
-    }
-    return zenoh.open(_config(settings))
+def is_connected(session: Session) -> bool:
+    """Tell whether a client's session has a router at the moment.
+
+    A killed router is noticed at once, one that stands still after its lease.
+    """
+    return bool(session.info.routers_zid())
+
+
+def _check_protection(endpoint: str, credentials: "Credentials | None") -> None:
+    """Check that an endpoint that encrypts has keys, and that keys are not given where they would protect nothing.
+
+    Raises:
+        InvalidValueError: It is not so.
+    """
+    if is_encrypted(endpoint) == (credentials is not None):
+        return
+    if credentials is None:
+        message = f"'{endpoint}' is encrypted and needs keys: add --keys FOLDER."
+    else:
+        message = (
+            f"'{endpoint}' is not encrypted, so that keys protect nothing there: use tls/{endpoint.partition('/')[2]}."
+        )
+    raise InvalidValueError(message)
+
+
+def _nobody_answers(connect: str, credentials: "Credentials | None") -> str:
+    """Say what may be wrong when no session could be opened; Zenoh does not tell."""
+    if credentials is None:
+        return (
+            f"No learner or router answers at {connect}; "
+            "start one with `hoz-dist learner --listen ...` or check the address."
+        )
+    return (
+        f"No router at {connect} lets us in; check the address, that the router runs, that its certificate names this "
+        f"host, and that the key in '{credentials.folder}' is of the same authority."
+    )
+
+
+def _listen(config: zenoh.Config, where: str) -> Session:
+    """Open a router.
+
+    Raises:
+        ConnectionFailedError: It cannot listen.
+    """
+    try:
+        return zenoh.open(config)
+    except zenoh.ZError as error:
+        message = f"Cannot listen at {where}: {_reason(error)}; choose another endpoint with --listen."
+        raise ConnectionFailedError(message) from error
 
 
 def _reason(error: zenoh.ZError) -> str:
@@ -108,14 +173,34 @@ def _reason(error: zenoh.ZError) -> str:
         return "it is in use"
     if "Cannot assign requested address" in text:
         return "the address does not belong to this machine"
-    # Zenoh's own words, less the places in its source code; the innermost cause stands in brackets.
-    words = re.sub(r" at \S+\.rs:\d+\.?", "", text)
+    return _words(error)
+
+
+def _words(error: zenoh.ZError) -> str:
+    """Return Zenoh's own words, less the places in its source code; the innermost cause stands in brackets."""
+    words = re.sub(r" at \S+\.rs:\d+\.?", "", str(error))
     cause = re.search(r": \[(.*)\]$", words)
     return (cause[1] if cause else words).rstrip(". ")
 
 
-def _config(settings: dict[str, Any]) -> zenoh.Config:
-    config = zenoh.Config()
-    for path, value in (_COMMON | settings).items():
+def _read_config(path: Path) -> zenoh.Config:
+    """Read a configuration file.
+
+    Raises:
+        NotFoundError: There is none.
+        DamagedFileError: It is no configuration of Zenoh.
+    """
+    if not path.is_file():
+        message = f"There is no router configuration '{path}'; `hoz-dist keys issue router NAME` makes one."
+        raise NotFoundError(message)
+    try:
+        return zenoh.Config.from_file(path)
+    except zenoh.ZError as error:
+        message = f"'{path}' is no configuration of Zenoh ({_words(error)})."
+        raise DamagedFileError(message) from error
+
+
+def _configured(config: zenoh.Config, settings: Mapping[str, Any]) -> zenoh.Config:
+    for path, value in settings.items():
         config.insert_json5(path, json.dumps(value))
     return config

@@ -1,0 +1,52 @@
+"""`hoz-dist router`: the meeting place of learners, actors and queries, where no zenohd is installed."""
+
+from pathlib import Path
+
+import click
+
+from hoz_dist.cli.connecting import keys_option
+from hoz_dist.errors import InvalidValueError
+from hoz_dist.wire.endpoint import DEFAULT_ENCRYPTED_ENDPOINT, DEFAULT_ENDPOINT
+
+
+@click.command("router")
+@click.option(
+    "--listen",
+    multiple=True,
+    metavar="ENDPOINT",
+    help="Endpoint to listen at, protocol/host:port; may be repeated.  "
+    f"[default: {DEFAULT_ENDPOINT}, with --keys {DEFAULT_ENCRYPTED_ENDPOINT}]",
+)
+@keys_option
+@click.option(
+    "--config",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Configuration of a Zenoh router, JSON5, such as router.json5 of a key folder; instead of the other options.",
+)
+def router_command(*, listen: tuple[str, ...], keys: Path | None, config: Path | None) -> None:
+    """Run a router until it is stopped by SIGINT or SIGTERM.
+
+    A Zenoh router of another making, `zenohd --config FILE`, does the same.
+    """
+    import signal
+    import threading
+
+    from hoz_dist.wire.session import open_configured_router, open_router
+
+    if config is not None and (listen or keys is not None):
+        message = "--config says everything: leave out --listen and --keys, or leave out --config."
+        raise InvalidValueError(message)
+    credentials = None
+    if keys is not None:
+        from hoz_dist.wire.credentials import load_credentials
+
+        credentials = load_credentials(keys, ["router"])
+    stop = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: stop.set())
+    endpoints = listen or (DEFAULT_ENDPOINT if keys is None else DEFAULT_ENCRYPTED_ENDPOINT,)
+    session = open_router(endpoints, credentials) if config is None else open_configured_router(config)
+    with session:
+        click.echo(f"Listening at {', '.join(endpoints) if config is None else f'the endpoints in {config}'}.")
+        stop.wait()

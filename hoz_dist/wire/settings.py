@@ -1,0 +1,66 @@
+"""Settings of Zenoh that all our sessions share, as paths in its configuration.
+
+They follow what was measured: no multicast (container networks have none), retries from 200 ms to 2 s (the default
+takes 3.4 s to come back), short leases, a queue that holds a whole shard of parameters.
+"""
+
+from typing import TYPE_CHECKING, Any, Final
+
+if TYPE_CHECKING:
+    from hoz_dist.wire.credentials import Credentials
+
+SERVICE_LEASE_MS: Final = 2000
+"""Routers and learners: one that is silent for so long is given up, so that a standby takes over soon."""
+CLIENT_LEASE_MS: Final = 5000
+"""Actors and clients: they may be behind a link that loses packets, and stand still for seconds."""
+
+_COMMON: Final[dict[str, Any]] = {
+    "scouting/multicast/enabled": False,
+    "scouting/gossip/enabled": False,
+    "scouting/delay": 0,  # nothing is scouted for; a router would wait half a second for it all the same
+    # Plain bytes: implicit shared memory leaks segments of killed processes, and serves messages up to 16 MB only.
+    "transport/shared_memory/enabled": False,
+    # The priority of questions and answers. 16 batches of 64 KiB hold a shard of 512 KiB: a router that forwards one to
+    # a client that stands still must not wait for it, because everybody else would wait too.
+    "transport/link/tx/queue/size/data": 16,
+    # A receiver that takes nothing for this long loses the transport, and with it what was in flight (5 s by default).
+    "transport/link/tx/queue/congestion_control/block/wait_before_close": 10_000_000,
+    "transport/link/rx/buffer_size": 4 * 1024 * 1024,
+    "transport/link/rx/max_message_size": 128 * 1024 * 1024,
+}
+
+
+def router_settings() -> dict[str, Any]:
+    """Return the settings of a router, less its endpoints and keys."""
+    return _COMMON | {
+        "mode": "router",
+        "listen/exit_on_failure": True,
+        "listen/timeout_ms": 0,
+        "transport/link/tx/lease": SERVICE_LEASE_MS,
+    }
+
+
+def client_settings(lease_ms: int) -> dict[str, Any]:
+    """Return the settings of a router's client, less its endpoint and keys."""
+    return _COMMON | {
+        "mode": "client",
+        "connect/retry": {"period_init_ms": 200, "period_max_ms": 2000, "period_increase_factor": 2},
+        "transport/link/tx/lease": lease_ms,
+    }
+
+
+def tls_settings(credentials: "Credentials") -> dict[str, Any]:
+    """Return the settings with which a session, router or client, shows its keys and checks those of the other side."""
+    certificate, key = str(credentials.certificate), str(credentials.key)
+    return {
+        "transport/link/tls": {
+            "root_ca_certificate": str(credentials.authority),
+            "enable_mtls": True,
+            "listen_certificate": certificate,
+            "listen_private_key": key,
+            "connect_certificate": certificate,
+            "connect_private_key": key,
+            "verify_name_on_connect": True,
+            "close_link_on_expiration": True,
+        }
+    }
