@@ -1,7 +1,8 @@
 """`hoz-dist status`: asks a learner who takes part and how it goes."""
 
-from collections import Counter
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Callable
+from contextlib import ExitStack, suppress
+from typing import TYPE_CHECKING, Final
 
 import click
 
@@ -9,70 +10,63 @@ from hoz_dist.cli.connecting import connect_option, run_option
 from hoz_dist.cli.options import echo_json, json_option
 
 if TYPE_CHECKING:
-    from rich.table import Table
+    from hoz_dist.client import HozClient
 
-_NAMED_ROOMS: Final = 3
-"""Rooms of a process that are named one by one."""
+EVERY_S: Final = 2.0
+"""Time between two renewals by default, seconds."""
 
 
 @click.command("status")
 @connect_option
 @run_option
+@click.option("--watch", is_flag=True, help="Renew until Ctrl-C: in place on a terminal, a line each time elsewhere.")
+@click.option(
+    "--every",
+    type=click.FloatRange(min=0.1),
+    metavar="SECONDS",
+    help=f"Time between two renewals of --watch.  [default: {EVERY_S:g}]",
+)
 @json_option
-def status_command(*, connect: str, run: str | None, as_json: bool) -> None:
-    """Show the live processes of a run, the version of its parameters, and what was rejected."""
+def status_command(*, connect: str, run: str | None, watch: bool, every: float | None, as_json: bool) -> None:
+    """Show the live processes of a run, who left, the version of its parameters, and what was rejected.
+
+    With --watch it goes on while the learner or the router is away, and says so.
+    """
     from hoz_dist.client import HozClient
 
-    with HozClient(connect, run) as client:
+    if every is not None and not watch:
+        message = "--every is the time between two renewals: it needs --watch."
+        raise click.UsageError(message)
+
+    def open_client() -> HozClient:
+        return HozClient(connect, run)
+
+    if watch:
+        # Ctrl-C is how one ends it, and nothing went wrong.
+        with suppress(KeyboardInterrupt):
+            _watch(open_client, every or EVERY_S, as_json=as_json)
+        return
+    with open_client() as client:
         status = client.status()
     if as_json:
         echo_json(status)
         return
-    from rich.console import Console
+    from hoz_dist.cli.status_text import status_console, status_page
 
-    console = Console()
-    console.print(_headline(status), markup=False, highlight=False)
-    console.print(_process_table(status["processes"]))
-    rejected = ", ".join(f"{reason} {count}" for reason, count in sorted(status["rejected"].items()))
-    console.print(f"Rejected messages: {rejected or 'none'}", markup=False, highlight=False)
+    status_console().print(status_page(status))
 
 
-def _headline(status: dict[str, Any]) -> str:
-    """Say how far the run is; what the learner does not tell is left out."""
-    parts = [f"version {status['version']:,} of epoch {status['epoch']}"]
-    if isinstance(frames := status.get("frames"), int):
-        parts.append(f"{frames:,} frames")
-    if isinstance(rate := status.get("frames_per_second"), float | int):
-        parts.append(f"{rate:,.0f} frames/s")
-    success = status.get("success")
-    if isinstance(success, dict) and isinstance(share := success.get("overall"), float | int):
-        parts.append(f"success {share:.0%}")
-    if isinstance(progress := status.get("progress"), float | int):
-        parts.append(f"{progress:.0%} done")
-    return ", ".join(parts)
+def _watch(open_client: "Callable[[], HozClient]", every: float, *, as_json: bool) -> None:
+    from hoz_dist.cli.status_text import status_console
+    from hoz_dist.cli.watching import Page, Watcher, print_json, print_line, watch
 
-
-def _rooms_text(rooms: list[str]) -> str:
-    """Name a few rooms; count many by scene."""
-    if len(rooms) <= _NAMED_ROOMS:
-        return ", ".join(rooms)
-    scenes = Counter(room.partition("/")[0] for room in rooms)
-    return ", ".join(f"{scene} ({count})" for scene, count in scenes.items())
-
-
-def _process_table(processes: list[dict[str, Any]]) -> "Table":
-    """List the holders of a live token."""
-    from rich.table import Table
-
-    table = Table("role", "id", "rooms", "frames", "frames/s", "lag", "rejected", title="Live processes")
-    for process in processes:
-        table.add_row(
-            process["role"],
-            process["id"],
-            _rooms_text(process["rooms"]),
-            f"{process['frames']:,}",
-            f"{process['frames_per_second']:,.0f}",
-            f"{process['lag']:.1f}",
-            str(process["rejected"]),
-        )
-    return table
+    console = status_console()
+    with ExitStack() as stack:
+        watcher = stack.enter_context(Watcher(open_client))
+        if as_json:
+            show = print_json
+        elif console.is_terminal:
+            show = stack.enter_context(Page(console)).show
+        else:
+            show = print_line
+        watch(watcher, show, every)
