@@ -10,7 +10,7 @@ It needs neither a learning library nor a simulator, and starts in a fraction of
 import threading
 from collections.abc import Sequence
 from contextlib import ExitStack
-from typing import Any, Final, TypeVar
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from hoz_dist.closing import Closing
 from hoz_dist.errors import ConnectionFailedError, HozError, InvalidValueError, NotFoundError, UnknownNameError
@@ -39,6 +39,9 @@ from hoz_dist.wire.session import open_client
 from hoz_dist.wire.snapshots import SEEN_SEPARATOR
 from hoz_dist.wire.waiting import Backoff, Deadline
 
+if TYPE_CHECKING:
+    from hoz_dist.wire.credentials import Credentials
+
 ANSWER_S: Final = 2.0
 """How long an answer may take, seconds."""
 _ERRORS: Final[dict[str, type[HozError]]] = {
@@ -56,18 +59,22 @@ class HozClient(Closing):
     Args:
         endpoint: Where the learner or its router listens, for example ``tcp/127.0.0.1:7447``.
         run: Name of the run; None for the only one that is found.
+        credentials: Keys for an endpoint that asks for them, ``load_credentials("keys/viewer-v0")`` for example.
 
     Raises:
-        InvalidValueError: The endpoint is malformed.
-        ConnectionFailedError: Nobody answers there.
+        InvalidValueError: The endpoint is malformed, or is none for the credentials.
+        ConnectionFailedError: Nobody answers there, or lets us in.
     """
 
-    def __init__(self, endpoint: str = DEFAULT_ENDPOINT, run: str | None = None) -> None:
+    def __init__(
+        self, endpoint: str = DEFAULT_ENDPOINT, run: str | None = None, credentials: "Credentials | None" = None
+    ) -> None:
         self.endpoint = endpoint
+        self._credentials = credentials
         self._run = run
         self._keys: Keys | None = None
         self._open = ExitStack()
-        self._session = self._open.enter_context(open_client(endpoint))
+        self._session = self._open.enter_context(open_client(endpoint, credentials=credentials))
 
     def runs(self) -> list[str]:
         """Return the names of the runs whose learners answer now, sorted."""
@@ -161,10 +168,16 @@ class HozClient(Closing):
         while not (answers := ask(self._session, selector, timeout_s=ANSWER_S)):
             # Zenoh also gives an empty answer while a learner or router that was away is coming back.
             if deadline.passed:
-                message = f"The learner at {self.endpoint} does not answer; it may have stopped, or be starting again."
-                raise ConnectionFailedError(message)
+                raise ConnectionFailedError(self._no_answer())
             backoff.pause(deadline)
         reply = decode(answers[0].payload, expected, Refused)
         if isinstance(reply, Refused):
             raise _ERRORS.get(reply.reason, HozError)(reply.detail)
         return reply  # type: ignore[return-value]  # the only other kind that was expected
+
+    def _no_answer(self) -> str:
+        """Say what may be wrong when nobody answers; a router that denies something says nothing."""
+        message = f"The learner at {self.endpoint} does not answer; it may have stopped, or be starting again"
+        if self._credentials is None:
+            return f"{message}."
+        return f"{message}, or the key in '{self._credentials.folder}' may not allow the question."

@@ -8,7 +8,7 @@ from typing import Final
 
 import click
 
-from hoz_dist.cli.connecting import connect_option, run_option
+from hoz_dist.cli.connecting import connect_option, credentials_in, keys_option, run_option
 from hoz_dist.cli.options import cache_option, weights_option
 from hoz_dist.nav.categories import SCENES
 
@@ -26,10 +26,12 @@ CONNECT_S: Final = 5.0
     help=f"Scene ({', '.join(SCENES)}: all its training rooms) or training room (kitchen/3); may be repeated.",
 )
 @connect_option
+@keys_option
 @run_option
 @click.option(
     "--name",
-    help="Name of this actor, unique in the run; its episodes follow from it and the run's seed.  [default: HOST-PID]",
+    help="Name of this actor, unique in the run; its episodes follow from it and the run's seed.  "
+    "[default: that of its key, else HOST-PID]",
 )
 @weights_option
 @cache_option
@@ -37,6 +39,7 @@ CONNECT_S: Final = 5.0
 def actor_command(
     scenes: tuple[str, ...],
     connect: str,
+    keys: Path | None,
     run: str | None,
     name: str | None,
     weights: Path | None,
@@ -58,11 +61,13 @@ def actor_command(
     from hoz_dist.wire.waiting import StoppedError
 
     rooms = training_rooms(scenes)
+    credentials = credentials_in(keys, ["actor"])
+    actor = credentials.own_name(name) if credentials else name or _default_name()
     logging.basicConfig(level=logging.INFO, format="%(asctime)s %(message)s", datefmt="%H:%M:%S")
     stop = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop.set())
-    with suppress(StoppedError), open_client(connect, CONNECT_S, stop) as session:
+    with suppress(StoppedError), open_client(connect, CONNECT_S, stop, credentials) as session:
         # Only now, that somebody answers: these take seconds to import.
         import torch
 
@@ -75,7 +80,6 @@ def actor_command(
 
         # A process is one thread: actors share the cores, and one thread adds up the same way every time.
         torch.set_num_threads(1)
-        actor = name or _default_name()
         with LearnerLink(session, actor, run, stop) as link, ExitStack() as stack:
             size = link.config.picture_size
             encoder = matching_encoder(link.config, weights)

@@ -1,10 +1,18 @@
 """Options of the commands that connect to a learner."""
 
+from collections.abc import Collection
 from pathlib import Path
+from typing import TYPE_CHECKING, Final
 
 import click
 
 from hoz_dist.wire.endpoint import DEFAULT_ENDPOINT
+
+if TYPE_CHECKING:
+    from hoz_dist.wire.credentials import Credentials
+
+READERS: Final = ("viewer", "actor", "learner")
+"""Roles that may ask questions."""
 
 connect_option = click.option(
     "--connect",
@@ -20,3 +28,20 @@ keys_option = click.option(
     metavar="FOLDER",
     help="Folder with the keys of this process, made by `hoz-dist keys`.  [default: none, for tcp/ endpoints]",
 )
+
+
+def credentials_in(keys: Path | None, roles: Collection[str]) -> "Credentials | None":
+    """Read the key folder that the user named; None when there is none.
+
+    Args:
+        keys: The folder.
+        roles: Roles that are fit for the command.
+
+    Raises:
+        HozError: The folder cannot be used.
+    """
+    if keys is None:
+        return None
+    from hoz_dist.wire.credentials import load_credentials
+
+    return load_credentials(keys, roles)

@@ -35,6 +35,7 @@ COMMANDS: Final[dict[str, Entry]] = {
     "learner": Entry("hoz_dist.cli.learner:learner_command", "Run a learner that actors and queries connect to."),
     "actor": Entry("hoz_dist.cli.actor:actor_command", "Run an actor that trains in its rooms for a learner."),
     "router": Entry("hoz_dist.cli.router:router_command", "Run a router that learners, actors and queries meet at."),
+    "keys": Entry("hoz_dist.cli.keys:keys_group", "Make keys that let processes in and say what they may do."),
     "query": Entry("hoz_dist.cli.query:query_command", "Ask a learner for a scene graph or a plan."),
     "status": Entry("hoz_dist.cli.status:status_command", "Ask a learner how the run goes."),
     "evaluate": Entry("hoz_dist.cli.evaluate:evaluate_command", "Measure a checkpoint on rooms it was not trained in."),

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 import click
 
-from hoz_dist.cli.connecting import connect_option, run_option
+from hoz_dist.cli.connecting import READERS, connect_option, credentials_in, keys_option, run_option
 from hoz_dist.cli.options import force_option
 from hoz_dist.errors import InvalidValueError
 from hoz_dist.nav.categories import category_index, scene_index
@@ -27,6 +27,7 @@ _TOP: Final = 5
 @click.command("query")
 @click.argument("name", metavar="SCENE|ROOM")
 @connect_option
+@keys_option
 @run_option
 @click.option("--target", metavar="CATEGORY", help="Object to find: asks for a plan. Needs --seen.")
 @click.option("--seen", metavar="A,B,...", help="Objects that are seen now, such as Sink,Toaster. Needs --target.")
@@ -42,6 +43,7 @@ def query_command(
     *,
     name: str,
     connect: str,
+    keys: Path | None,
     run: str | None,
     target: str | None,
     seen: str | None,
@@ -77,7 +79,7 @@ def query_command(
     for category in [*wanted, *([] if target is None else [target])]:
         category_index(category)
 
-    with HozClient(connect, run) as client:
+    with HozClient(connect, run, credentials_in(keys, READERS)) as client:
         if target is None:
             content = _graph_content(_graph(client, name), shape)
         else:

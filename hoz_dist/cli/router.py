@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from hoz_dist.cli.connecting import keys_option
+from hoz_dist.cli.connecting import credentials_in, keys_option
 from hoz_dist.errors import InvalidValueError
 from hoz_dist.wire.endpoint import DEFAULT_ENCRYPTED_ENDPOINT, DEFAULT_ENDPOINT
 
@@ -37,11 +37,7 @@ def router_command(*, listen: tuple[str, ...], keys: Path | None, config: Path |
     if config is not None and (listen or keys is not None):
         message = "--config says everything: leave out --listen and --keys, or leave out --config."
         raise InvalidValueError(message)
-    credentials = None
-    if keys is not None:
-        from hoz_dist.wire.credentials import load_credentials
-
-        credentials = load_credentials(keys, ["router"])
+    credentials = credentials_in(keys, ["router"])
     stop = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop.set())

@@ -2,11 +2,12 @@
 
 from collections.abc import Callable
 from contextlib import ExitStack, suppress
+from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import click
 
-from hoz_dist.cli.connecting import connect_option, run_option
+from hoz_dist.cli.connecting import READERS, connect_option, credentials_in, keys_option, run_option
 from hoz_dist.cli.options import echo_json, json_option
 
 if TYPE_CHECKING:
@@ -18,6 +19,7 @@ EVERY_S: Final = 2.0
 
 @click.command("status")
 @connect_option
+@keys_option
 @run_option
 @click.option("--watch", is_flag=True, help="Renew until Ctrl-C: in place on a terminal, a line each time elsewhere.")
 @click.option(
@@ -27,7 +29,9 @@ EVERY_S: Final = 2.0
     help=f"Time between two renewals of --watch.  [default: {EVERY_S:g}]",
 )
 @json_option
-def status_command(*, connect: str, run: str | None, watch: bool, every: float | None, as_json: bool) -> None:
+def status_command(
+    *, connect: str, keys: Path | None, run: str | None, watch: bool, every: float | None, as_json: bool
+) -> None:
     """Show the live processes of a run, who left, the version of its parameters, and what was rejected.
 
     With --watch it goes on while the learner or the router is away, and says so.
@@ -38,8 +42,10 @@ def status_command(*, connect: str, run: str | None, watch: bool, every: float |
         message = "--every is the time between two renewals: it needs --watch."
         raise click.UsageError(message)
 
+    credentials = credentials_in(keys, READERS)
+
     def open_client() -> HozClient:
-        return HozClient(connect, run)
+        return HozClient(connect, run, credentials)
 
     if watch:
         # Ctrl-C is how one ends it, and nothing went wrong.

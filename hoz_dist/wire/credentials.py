@@ -61,13 +61,30 @@ class Credentials:
         """Configuration with the access control; only a router has one."""
         return self.folder / ROUTER_FILE
 
+    def own_name(self, asked: str | None) -> str:
+        """Return the name that the holder goes by: no router lets anything pass under another.
+
+        Args:
+            asked: The name that the user wants; None for no wish.
+
+        Raises:
+            InvalidValueError: It is another one.
+        """
+        if asked not in (None, self.name):
+            message = (
+                f"The key in '{self.folder}' is of the {self.role} '{self.name}', so that it cannot be '{asked}'; "
+                "leave out --name, or give the key of that name."
+            )
+            raise InvalidValueError(message)
+        return self.name
+
 
 def common_name(role: str, name: str) -> str:
     """Return the common name of the certificates of a process; access control knows processes by it."""
     return f"{role}-{name}"
 
 
-def load_credentials(folder: Path, roles: Collection[str] = ROLES) -> Credentials:
+def load_credentials(folder: Path | str, roles: Collection[str] = ROLES) -> Credentials:
     """Read who a key folder makes of us.
 
     Args:
@@ -80,7 +97,7 @@ def load_credentials(folder: Path, roles: Collection[str] = ROLES) -> Credential
         InvalidValueError: Others can read the private key, the certificate is expired or not valid yet, or it is of a
             role that is not fit.
     """
-    folder = folder.absolute()
+    folder = Path(folder).absolute()
     wanted = [AUTHORITY_FILE, CERTIFICATE_FILE, KEY_FILE]
     missing = [name for name in wanted if not (folder / name).is_file()]
     if missing:

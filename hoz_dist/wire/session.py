@@ -52,7 +52,7 @@ def open_router(listen: str | Sequence[str], credentials: "Credentials | None" =
     settings = router_settings() | {"listen/endpoints": endpoints}
     if credentials is not None:
         access_control = _read_config(credentials.router_file).get_json("access_control")
-        settings |= tls_settings(credentials) | {"access_control": json.loads(access_control)}
+        settings |= _keys(credentials) | {"access_control": json.loads(access_control)}
     return _listen(_configured(zenoh.Config(), settings), ", ".join(endpoints))
 
 
@@ -102,7 +102,7 @@ def open_client(
     _check_protection(endpoint, credentials)
     settings = client_settings(lease_ms) | {"connect/endpoints": [endpoint]}
     if credentials is not None:
-        settings |= tls_settings(credentials)
+        settings |= _keys(credentials)
     while True:
         # Zenoh cannot be told to stop meanwhile, and is not interrupted by signals.
         attempt_ms = max(round(deadline.within(_ATTEMPT_S) * 1000), 1)
@@ -121,6 +121,10 @@ def is_connected(session: Session) -> bool:
     A killed router is noticed at once, one that stands still after its lease.
     """
     return bool(session.info.routers_zid())
+
+
+def _keys(credentials: "Credentials") -> dict[str, Any]:
+    return tls_settings(credentials.authority, credentials.certificate, credentials.key)
 
 
 def _check_protection(endpoint: str, credentials: "Credentials | None") -> None:

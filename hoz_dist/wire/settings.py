@@ -4,10 +4,8 @@ They follow what was measured: no multicast (container networks have none), retr
 takes 3.4 s to come back), short leases, a queue that holds a whole shard of parameters.
 """
 
-from typing import TYPE_CHECKING, Any, Final
-
-if TYPE_CHECKING:
-    from hoz_dist.wire.credentials import Credentials
+from pathlib import PurePath
+from typing import Any, Final
 
 SERVICE_LEASE_MS: Final = 2000
 """Routers and learners: one that is silent for so long is given up, so that a standby takes over soon."""
@@ -49,17 +47,22 @@ def client_settings(lease_ms: int) -> dict[str, Any]:
     }
 
 
-def tls_settings(credentials: "Credentials") -> dict[str, Any]:
-    """Return the settings with which a session, router or client, shows its keys and checks those of the other side."""
-    certificate, key = str(credentials.certificate), str(credentials.key)
+def tls_settings(authority: PurePath, certificate: PurePath, key: PurePath) -> dict[str, Any]:
+    """Return the settings with which a session, router or client, shows its key and checks that of the other side.
+
+    Args:
+        authority: File of the certificate of the authority that must have signed the other side's.
+        certificate: File of one's own certificate.
+        key: File of its private key.
+    """
     return {
         "transport/link/tls": {
-            "root_ca_certificate": str(credentials.authority),
+            "root_ca_certificate": str(authority),
             "enable_mtls": True,
-            "listen_certificate": certificate,
-            "listen_private_key": key,
-            "connect_certificate": certificate,
-            "connect_private_key": key,
+            "listen_certificate": str(certificate),
+            "listen_private_key": str(key),
+            "connect_certificate": str(certificate),
+            "connect_private_key": str(key),
             "verify_name_on_connect": True,
             "close_link_on_expiration": True,
         }

@@ -1,0 +1,204 @@
+"""The files of an authority: its own, and the folders that are carried to the machines of those it issues keys for.
+
+A private key is readable by its owner alone from the first moment on, and its folder appears complete or not at all.
+"""
+
+import os
+import shutil
+import uuid
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import timedelta
+from functools import partial
+from pathlib import Path
+from typing import Final
+
+from filelock import FileLock
+
+from hoz_dist.atomic import TEMPORARY_SUFFIX, replace_file
+from hoz_dist.errors import InvalidValueError, NotFoundError
+from hoz_dist.security.authority import Authority, KeyPair
+from hoz_dist.security.register import REGISTER_FILE, Identity, Register, check_identity
+from hoz_dist.security.router_file import router_file
+from hoz_dist.wire.credentials import AUTHORITY_FILE, CERTIFICATE_FILE, KEY_FILE, ROUTER_FILE, common_name
+from hoz_dist.wire.endpoint import DEFAULT_ENCRYPTED_ENDPOINT
+
+AUTHORITY_KEY_FILE: Final = "ca.key"
+_LOCK_FILE: Final = ".lock"
+_LOCAL_HOSTS: Final = ("localhost", "127.0.0.1")
+"""In the certificate of every router."""
+
+
+@dataclass(frozen=True)
+class RouterPlace:
+    """Where a router will be.
+
+    Attributes:
+        hosts: Names and addresses by which clients reach it, besides those of the machine itself.
+        listen: Endpoints where it listens.
+        at: Where its key folder will be on its machine; None for where it is made.
+    """
+
+    hosts: tuple[str, ...] = ()
+    listen: tuple[str, ...] = (DEFAULT_ENCRYPTED_ENDPOINT,)
+    at: str | None = None
+
+
+def create_authority(folder: Path) -> None:
+    """Make an authority in a folder.
+
+    Raises:
+        InvalidValueError: One is there already.
+    """
+    folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+    with FileLock(folder / _LOCK_FILE):
+        if any((folder / name).exists() for name in (AUTHORITY_FILE, AUTHORITY_KEY_FILE)):
+            message = (
+                f"'{folder}' has an authority already, and without it the keys that it issued are worth nothing; "
+                "choose another folder."
+            )
+            raise InvalidValueError(message)
+        pair = Authority.create().pair
+        replace_file(folder / AUTHORITY_KEY_FILE, partial(_write_private, content=pair.private_key_pem))
+        replace_file(folder / AUTHORITY_FILE, partial(_write, content=pair.certificate_pem))
+
+
+def issue_keys(
+    folder: Path,
+    role: str,
+    names: Sequence[str],
+    lifetime: timedelta,
+    place: RouterPlace | None = None,
+    *,
+    replace: bool = False,
+) -> list[tuple[Identity, Path]]:
+    """Make keys, and let their holders in at the routers.
+
+    Args:
+        folder: Folder of the authority; the key folders are made in it.
+        role: Role of the holders.
+        names: Their names.
+        lifetime: How long the keys are valid.
+        place: Where the holders are, if they are routers.
+        replace: Whether a name that has a key folder gets a new one instead.
+
+    Returns:
+        Everybody's identity and key folder, in the order of the names.
+
+    Raises:
+        NotFoundError: There is no authority in the folder.
+        DamagedFileError: Its files cannot be read.
+        UnknownNameError: There is no such role.
+        InvalidValueError: A name cannot be one, or has a key folder already.
+    """
+    for name in names:
+        check_identity(role, name)
+    with FileLock(_authority_folder(folder) / _LOCK_FILE):
+        authority, register = _load_authority(folder), Register(folder)
+        targets = {name: folder / common_name(role, name) for name in names}
+        for name, target in targets.items():
+            if target.exists() and not replace:
+                message = f"The {role} '{name}' has a key already, '{target}'; add --replace to issue it anew."
+                raise InvalidValueError(message)
+        issued = [(_issue(authority, role, name, lifetime, target, place), target) for name, target in targets.items()]
+        register.add(*(identity for identity, _ in issued))
+        _write_router_files(folder, register)
+    return issued
+
+
+def withdraw_key(folder: Path, role: str, name: str) -> None:
+    """Strike somebody off, so that the routers, once started again, deny everything to the holder of the key.
+
+    Args:
+        folder: Folder of the authority.
+        role: Role of the holder.
+        name: Name of the holder.
+
+    Raises:
+        NotFoundError: There is no authority in the folder, or nobody of that name has a key.
+        DamagedFileError: Its files cannot be read.
+        UnknownNameError: There is no such role.
+        InvalidValueError: The name cannot be one.
+    """
+    check_identity(role, name)
+    with FileLock(_authority_folder(folder) / _LOCK_FILE):
+        register = Register(folder)
+        struck_off = register.remove(role, name)
+        shutil.rmtree(folder / common_name(role, name), ignore_errors=True)
+        # Also when nobody was struck off: a withdrawal that was killed half-way is completed by the next one.
+        _write_router_files(folder, register)
+    if struck_off is None:
+        message = f"No key was issued for a {role} '{name}'; see '{folder / REGISTER_FILE}' for who has one."
+        raise NotFoundError(message)
+
+
+def _authority_folder(folder: Path) -> Path:
+    """Return the folder when it holds an authority.
+
+    Raises:
+        NotFoundError: It does not.
+    """
+    missing = [name for name in (AUTHORITY_FILE, AUTHORITY_KEY_FILE) if not (folder / name).is_file()]
+    if missing:
+        message = (
+            f"'{folder}' holds no authority ({' and '.join(missing)} missing); make one with `hoz-dist keys init`."
+        )
+        raise NotFoundError(message)
+    return folder
+
+
+def _load_authority(folder: Path) -> Authority:
+    return Authority.load((folder / AUTHORITY_FILE).read_bytes(), (folder / AUTHORITY_KEY_FILE).read_bytes())
+
+
+def _issue(
+    authority: Authority, role: str, name: str, lifetime: timedelta, target: Path, place: RouterPlace | None
+) -> Identity:
+    """Make one key and its folder."""
+    hosts = tuple(dict.fromkeys((*_LOCAL_HOSTS, *place.hosts))) if place else ()
+    pair = authority.issue(common_name(role, name), hosts, lifetime)
+    _replace_folder(target, authority, pair)
+    return Identity(
+        role=role,
+        name=name,
+        serial=f"{pair.certificate.serial_number:x}",
+        expires=pair.certificate.not_valid_after_utc,
+        hosts=hosts,
+        listen=place.listen if place else (),
+        at=(place.at or str(target.absolute())) if place else "",
+    )
+
+
+def _replace_folder(target: Path, authority: Authority, pair: KeyPair) -> None:
+    """Write a key folder beside its place, then put it there."""
+    temporary = target.with_name(f".{uuid.uuid4().hex}{TEMPORARY_SUFFIX}")
+    old = temporary.with_suffix(".old")
+    temporary.mkdir(mode=0o700)
+    try:
+        _write_private(temporary / KEY_FILE, pair.private_key_pem)
+        (temporary / CERTIFICATE_FILE).write_bytes(pair.certificate_pem)
+        (temporary / AUTHORITY_FILE).write_bytes(authority.pair.certificate_pem)
+        if target.exists():
+            target.rename(old)
+        temporary.rename(target)
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+        shutil.rmtree(old, ignore_errors=True)
+
+
+def _write(path: Path, content: bytes) -> None:
+    path.write_bytes(content)
+
+
+def _write_private(path: Path, content: bytes) -> None:
+    """Write a new file that nobody else can read at any time, whatever the user's umask."""
+    with os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as file:
+        file.write(content)
+
+
+def _write_router_files(folder: Path, register: Register) -> None:
+    """Tell every router whose folder is here who has a key now."""
+    for router in register.identities:
+        path = folder / common_name(router.role, router.name) / ROUTER_FILE
+        if router.role == "router" and path.parent.is_dir():
+            replace_file(path, partial(_write, content=router_file(router, register.identities)))
