@@ -12,27 +12,28 @@ TEMPORARY_SUFFIX: Final = ".tmp"
 """Of the files that a killed process may leave."""
 
 
-def replace_file(path: Path, write: Callable[[Path], object]) -> None:
-    """Write a file under a temporary name in the same folder, then give it its name; wait until both are on the disk.
+def replace_file(path: Path, write: Callable[[Path], object], via: Path | None = None) -> None:
+    """Write a file under a temporary name, then give it its name; wait until both are on the disk.
 
     Several processes may replace one file at once: the last wins.
 
     Args:
         path: The file to make or replace.
         write: Writes the temporary file that it is given.
+        via: Folder for the temporary file, on the same file system; None for that of the file.
 
     Raises:
         OSError: The disk is full, the folder cannot be written, ...
     """
     # Without the file's name, which may be as long as the system allows.
-    temporary = path.with_name(f".{uuid.uuid4().hex}{TEMPORARY_SUFFIX}")
+    temporary = (via or path.parent) / f".{uuid.uuid4().hex}{TEMPORARY_SUFFIX}"
     try:
         write(temporary)
-        _flush(temporary)
+        flush_to_disk(temporary)
         temporary.replace(path)
     finally:
         temporary.unlink(missing_ok=True)
-    _flush(path.parent)
+    flush_to_disk(path.parent)
 
 
 def remove_left_overs(folder: Path) -> None:
@@ -87,7 +88,7 @@ def write_atomically(path: Path, content: bytes, *, overwrite: bool) -> None:
         raise InvalidValueError(message) from error
 
 
-def _flush(path: Path) -> None:
+def flush_to_disk(path: Path) -> None:
     """Wait until a file, or the names in a folder, are on the disk."""
     descriptor = os.open(path, os.O_RDONLY)
     try:

@@ -3,14 +3,18 @@
 The tensors are ``parameters``, ``adam.first_moment``, ``adam.second_moment`` and, per known room,
 ``rooms/kitchen/3/nodes`` and ``.../edges``. Everything else is JSON in the file's metadata under ``hoz``; ``digest`` is
 XXH3-128 over that JSON and all tensors. Nothing in a checkpoint is ever executed.
+
+The name says where in the run it belongs: ``0002-000000123`` is version 123 of epoch 2. A checkpoint of a later epoch
+comes after all of an earlier one, also when its version is lower: what came in between was lost with its learner.
 """
 
 import json
 import logging
-from collections.abc import Mapping
+import re
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple, Protocol
 
 import numpy as np
 import xxhash
@@ -18,7 +22,7 @@ from numpy.typing import NDArray
 from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save_file
 
-from hoz_dist.atomic import remove_left_overs, replace_file
+from hoz_dist.atomic import replace_file
 from hoz_dist.config import RunConfig
 from hoz_dist.errors import DamagedFileError, InvalidValueError, NotFoundError
 from hoz_dist.graph.room_graph import RoomGraph
@@ -33,6 +37,7 @@ SUFFIX: Final = ".safetensors"
 KEPT_SUFFIX: Final = ".keep"
 """An empty file of this suffix beside a checkpoint says that it is never deleted."""
 NEWEST_KEPT: Final = 3
+_STEM: Final = re.compile(r"([0-9]{4,})-([0-9]{9,})")
 
 _log = logging.getLogger(__name__)
 
@@ -69,33 +74,71 @@ class Checkpoint:
         return {scene: merge_rooms(scene, rooms, self.graph_versions[scene]) for scene, rooms in scenes.items()}
 
 
-def save_checkpoint(folder: Path, checkpoint: Checkpoint, *, keep: bool = False) -> Path:
+class Files(Protocol):
+    """How the files of a run are changed: as `Leadership` does, which fails for a learner that no longer leads."""
+
+    def replace(self, path: Path, write: Callable[[Path], object]) -> None:
+        """Make or replace a file, as `replace_file` does."""
+
+    def remove(self, path: Path) -> None:
+        """Delete a file, if it is there."""
+
+
+class _OwnFiles:
+    """Files of a folder that no other process changes."""
+
+    def replace(self, path: Path, write: Callable[[Path], object]) -> None:
+        replace_file(path, write)
+
+    def remove(self, path: Path) -> None:
+        path.unlink(missing_ok=True)
+
+
+OWN_FILES: Final[Files] = _OwnFiles()
+
+
+class Stamp(NamedTuple):
+    """Where in a run a checkpoint belongs; later ones are greater."""
+
+    epoch: int
+    version: int
+
+    @classmethod
+    def of(cls, path: Path) -> "Stamp | None":
+        """Return what the name of a file says; None when it is not that of a checkpoint."""
+        match = _STEM.fullmatch(path.stem)
+        return cls(int(match[1]), int(match[2])) if match and path.suffix == SUFFIX else None
+
+
+def save_checkpoint(folder: Path, checkpoint: Checkpoint, *, keep: bool = False, files: Files = OWN_FILES) -> Path:
     """Write a checkpoint atomically, then delete all but the newest `NEWEST_KEPT` and those to keep.
 
     Args:
         folder: The folder of checkpoints; made when it is not there.
         checkpoint: What to write.
         keep: Never delete this one to make room for newer ones.
+        files: How to change the files of the folder.
 
     Returns:
-        The file, named by the version.
+        The file, named by epoch and version.
 
     Raises:
+        DeposedError: Another learner leads the run by now; nothing has changed.
         OSError: It could not be written; older checkpoints are untouched.
     """
     folder.mkdir(parents=True, exist_ok=True)
     tensors = _tensors_of(checkpoint)
     text = json.dumps(_values_of(checkpoint), sort_keys=True)
     metadata = {"hoz": text, "digest": _digest(text, tensors)}
-    path = folder / f"{checkpoint.version:09d}{SUFFIX}"
+    path = folder / f"{checkpoint.epoch:04d}-{checkpoint.version:09d}{SUFFIX}"
     try:
-        replace_file(path, lambda temporary: save_file(tensors, temporary, metadata))
+        files.replace(path, lambda temporary: save_file(tensors, temporary, metadata))
     except SafetensorError as error:
         message = f"cannot write the checkpoint '{path}': {error}"
         raise OSError(message) from error
     if keep:
-        path.with_suffix(KEPT_SUFFIX).touch()
-    _prune(folder, path)
+        files.replace(path.with_suffix(KEPT_SUFFIX), Path.touch)
+    _prune(folder, files)
     return path
 
 
@@ -119,8 +162,14 @@ def load_checkpoint(path: Path) -> Checkpoint:
     return checkpoint
 
 
-def newest_readable(folder: Path) -> tuple[Checkpoint, dict[Path, DamagedFileError]]:
+def newest_readable(
+    folder: Path, read: Callable[[Path], Checkpoint] | None = None
+) -> tuple[Checkpoint, dict[Path, DamagedFileError]]:
     """Read the newest checkpoint of a folder that is not damaged.
+
+    Args:
+        folder: The folder of checkpoints.
+        read: Reads one file, when it is not to be `load_checkpoint`.
 
     Returns:
         The checkpoint; and the newer ones that are damaged, with what is wrong with each.
@@ -137,7 +186,7 @@ def newest_readable(folder: Path) -> tuple[Checkpoint, dict[Path, DamagedFileErr
     damaged: dict[Path, DamagedFileError] = {}
     for file in files:
         try:
-            return _load_file(file), damaged
+            return (read or _load_file)(file), damaged
         except DamagedFileError as error:
             damaged[file] = error
     message = f"None of the {len(files)} checkpoints in '{folder}' can be read; the newest is '{files[0].name}'."
@@ -146,17 +195,28 @@ def newest_readable(folder: Path) -> tuple[Checkpoint, dict[Path, DamagedFileErr
 
 def checkpoint_files(folder: Path) -> list[Path]:
     """Return the checkpoints of a folder, the newest first."""
-    return sorted((file for file in folder.glob(f"*{SUFFIX}") if file.stem.isdigit()), reverse=True)
+    return [file for _, file in _stamped(folder)]
 
 
-def _prune(folder: Path, newest: Path) -> None:
-    """Delete what is too old, and what a killed process left half-written."""
-    remove_left_overs(folder)
-    droppable = [file for file in checkpoint_files(folder) if not file.with_suffix(KEPT_SUFFIX).exists()]
+def _stamped(folder: Path) -> list[tuple[Stamp, Path]]:
+    """Return the checkpoints of a folder and where in the run they belong, the newest first."""
+    stamped = ((Stamp.of(file), file) for file in folder.glob(f"*{SUFFIX}"))
+    return sorted(((stamp, file) for stamp, file in stamped if stamp is not None), reverse=True)
+
+
+def _prune(folder: Path, files: Files) -> None:
+    """Delete what is too old."""
+    droppable: list[Path] = []
+    kept: set[int] = set()
+    for stamp, file in _stamped(folder):
+        # A run that is over is saved again, to be kept, at the same version by each learner that opens it.
+        if file.with_suffix(KEPT_SUFFIX).exists() and stamp.version not in kept:
+            kept.add(stamp.version)
+        else:
+            droppable.append(file)
     for file in droppable[NEWEST_KEPT:]:
-        # After a damaged checkpoint of a higher version, the one just written is not the first of the list.
-        if file != newest:
-            file.unlink(missing_ok=True)
+        files.remove(file)
+        files.remove(file.with_suffix(KEPT_SUFFIX))
 
 
 def _tensors_of(checkpoint: Checkpoint) -> dict[str, NDArray[Any]]:

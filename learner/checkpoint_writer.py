@@ -8,7 +8,8 @@ from typing import Final
 
 from hoz_dist.errors import HozError
 from hoz_dist.wire.outage import Outage
-from learner.checkpoint import Checkpoint, save_checkpoint
+from learner.checkpoint import Checkpoint, Files, save_checkpoint
+from learner.leadership import DeposedError
 
 RETRY_S: Final = 5.0
 """Time until a checkpoint that could not be written is tried again."""
@@ -24,11 +25,13 @@ class CheckpointWriter:
     Args:
         folder: The folder of checkpoints.
         snapshot: Copies the state of the run as it is at a time.
+        files: How to change the files of the folder.
     """
 
-    def __init__(self, folder: Path, snapshot: Callable[[float], Checkpoint]) -> None:
+    def __init__(self, folder: Path, snapshot: Callable[[float], Checkpoint], files: Files) -> None:
         self._folder = folder
         self._snapshot = snapshot
+        self._files = files
         self._thread = ThreadPoolExecutor(1, "hoz-checkpoint")
         self._writing: Future[Path] | None = None
         self._due: float | None = None
@@ -57,7 +60,13 @@ class CheckpointWriter:
         if self._writing is None and self._due is not None and now >= self._due:
             self._due = None
             self._keeping, self._keep = self._keep, False
-            self._writing = self._thread.submit(save_checkpoint, self._folder, self._snapshot(now), keep=self._keeping)
+            self._writing = self._thread.submit(
+                save_checkpoint, self._folder, self._snapshot(now), keep=self._keeping, files=self._files
+            )
+
+    def abandon(self) -> None:
+        """Stop without saving, once the checkpoint that is being written is, or has failed to be."""
+        self._thread.shutdown()
 
     def close(self, now: float) -> Path:
         """Save a last checkpoint.
@@ -66,13 +75,14 @@ class CheckpointWriter:
             The file.
 
         Raises:
+            DeposedError: Another learner leads the run by now.
             HozError: It could not be written.
         """
         self._thread.shutdown()
         if self._writing is not None:
             self._finish(self._writing, now)
         try:
-            return save_checkpoint(self._folder, self._snapshot(now), keep=self._keep)
+            return save_checkpoint(self._folder, self._snapshot(now), keep=self._keep, files=self._files)
         except OSError as error:
             message = (
                 f"Cannot save the last checkpoint in '{self._folder}' ({error.strerror or error}); "
@@ -84,6 +94,8 @@ class CheckpointWriter:
         self._writing = None
         try:
             writing.result()
+        except DeposedError:
+            _log.warning("another learner leads the run by now: the checkpoint was not saved")
         except OSError as error:
             # Training on and trying again loses less than stopping would.
             self._outage.failed(error)

@@ -1,6 +1,7 @@
 """What the learner writes down as it goes: TensorBoard scalars and the record of updates."""
 
 import contextlib
+import os
 from pathlib import Path
 from typing import Any, Final
 
@@ -78,25 +79,19 @@ class ScalarRecorder:
 
 
 class UpdateLog:
-    """The record of applied updates; line v (from 0) made version v + 1.
+    """The record of the updates that are applied in one epoch, see `learner.replay`.
 
     Args:
-        path: The file.
-        version: Version that the run goes on from; lines of updates that were lost with an earlier learner are cut off.
+        path: The file, which exists; nobody else writes into it.
 
     Raises:
-        InvalidValueError: The file cannot be read or written.
+        InvalidValueError: The file cannot be written.
     """
 
-    def __init__(self, path: Path, version: int) -> None:
+    def __init__(self, path: Path) -> None:
         try:
-            path.touch()
-            with path.open("rb") as file:
-                for _ in range(version):
-                    file.readline()
-                self._size = file.tell()
             self._file = path.open("r+b", buffering=0)
-            self._file.truncate(self._size)
+            self._size = self._file.seek(0, os.SEEK_END)
         except OSError as error:
             message = f"Cannot write '{path}' ({error.strerror}); mend it or choose another run folder."
             raise InvalidValueError(message) from error

@@ -1,42 +1,40 @@
-"""A run's folder: its configuration, checkpoints, logs, and the lock that keeps a second learner out."""
+"""A run's folder: its configuration, its checkpoints, its logs, and how a learner takes it over."""
 
 import json
 import logging
-import shutil
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from filelock import FileLock, Timeout
-
-from hoz_dist.atomic import TEMPORARY_SUFFIX, replace_file
+from hoz_dist.atomic import TEMPORARY_SUFFIX
 from hoz_dist.config import RunConfig
 from hoz_dist.errors import DamagedFileError, HozError, InvalidValueError, NotFoundError, RunMismatchError
-from learner.checkpoint import FOLDER, Checkpoint, checkpoint_files, newest_readable
+from learner.checkpoint import FOLDER, Checkpoint, Stamp, checkpoint_files, newest_readable
+from learner.leadership import EPOCH_FILE, EPOCHS_FOLDER, Leadership, claim, is_held, newest_epoch
+from learner.replay import UPDATES_FOLDER, EpochStart
 
 CONFIG_FILE: Final = "config.json"
-LOCK_FILE: Final = "learner.lock"
-EPOCH_FILE: Final = "epoch"
-"""Holds the last epoch that was opened, since an epoch may end before its first checkpoint."""
-UPDATES_FILE: Final = "updates.jsonl"
 DAMAGED_SUFFIX: Final = ".damaged"
 """Put at the end of the name of a damaged checkpoint, which is thereby no checkpoint any more."""
+_CLAIMS: Final = 10
+"""Claims that a learner may lose to others before it gives in."""
 
 _log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
 class RunFolder:
-    """An open run folder. Get one from `open_run_folder`."""
+    """A run folder and the configuration that its run shall have.
+
+    Attributes:
+        path: The folder; `check` says whether it can be used, `make` makes it.
+        config: The configuration.
+    """
 
     path: Path
     config: RunConfig
-    epoch: int
-    """The epoch of this learner: one more than that of any learner before."""
-    checkpoint: Checkpoint | None
-    """Where the run goes on from; None for a new run."""
 
     @property
     def checkpoints(self) -> Path:
@@ -49,14 +47,131 @@ class RunFolder:
         return self.path / "tensorboard"
 
     @property
-    def updates(self) -> Path:
-        """The record of applied updates."""
-        return self.path / UPDATES_FILE
-
-    @property
     def log(self) -> Path:
-        """The learner's log."""
+        """The log of all learners."""
         return self.path / "learner.log"
+
+    def check(self) -> None:
+        """Look whether the folder can be that of the run, without changing anything.
+
+        Raises:
+            InvalidValueError: It holds other files.
+            RunMismatchError: Its run has another configuration.
+            DamagedFileError: Its configuration cannot be read.
+        """
+        _refuse_foreign(self.path)
+        if not (self.path / CONFIG_FILE).exists():
+            return
+        differences = read_config(self.path).differences(self.config)
+        if differences:
+            message = (
+                f"The run in '{self.path}' has another configuration ({'; '.join(differences)}); "
+                "give the same options as before, or another run folder."
+            )
+            raise RunMismatchError(message)
+
+    def make(self) -> None:
+        """Make the folder if it is not there.
+
+        Raises:
+            InvalidValueError: It cannot be made.
+        """
+        try:
+            self.path.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            message = f"Cannot use '{self.path}' as a run folder ({error.strerror}); choose another folder."
+            raise InvalidValueError(message) from error
+
+    def newest_epoch(self) -> int:
+        """Return the newest epoch of the run; 0 before the first."""
+        # Checkpoints that were copied into a new folder have had epochs elsewhere.
+        stamps = (Stamp.of(file) for file in checkpoint_files(self.checkpoints)[:1])
+        return max(newest_epoch(self.path), *(stamp.epoch for stamp in stamps if stamp is not None), 0)
+
+    def is_held(self, epoch: int) -> bool:
+        """Tell whether the learner that claimed an epoch lives, and has not ended its leadership."""
+        return is_held(self.path, epoch)
+
+    def claim(self, after: int) -> Leadership | None:
+        """Claim the epoch after another one; None when another learner was faster.
+
+        Raises:
+            InvalidValueError: The folder cannot be written.
+        """
+        try:
+            return claim(self.path, after)
+        except OSError as error:
+            raise self._unwritable(error) from error
+
+    def claim_or_refuse(self) -> Leadership:
+        """Claim a new epoch, unless somebody leads.
+
+        Raises:
+            InvalidValueError: Another learner leads the run, or the folder cannot be written.
+        """
+        for _ in range(_CLAIMS):
+            newest = self.newest_epoch()
+            if self.is_held(newest):
+                break
+            leadership = self.claim(newest)
+            if leadership is not None:
+                return leadership
+        message = f"Another learner is using the run folder '{self.path}'; stop it or choose another folder."
+        raise InvalidValueError(message)
+
+    def take_over(self, leadership: Leadership, read: Callable[[Path], Checkpoint] | None = None) -> "LedRun":
+        """Go on with the run, or begin it.
+
+        Args:
+            leadership: The right to do so.
+            read: Reads a checkpoint, when it is not to be `load_checkpoint`.
+
+        Raises:
+            DeposedError: Another learner has claimed the run meanwhile.
+            InvalidValueError: The folder cannot be written.
+            RunMismatchError: The folder's run has another configuration.
+            DamagedFileError: Its configuration, or every checkpoint, cannot be read.
+        """
+        self.check()
+        try:
+            if not (self.path / CONFIG_FILE).exists():
+                text = json.dumps(self.config.to_json(), indent=2) + "\n"
+                leadership.replace(self.path / CONFIG_FILE, lambda temporary: temporary.write_text(text, "utf-8"))
+            checkpoint = self._resume(read) if checkpoint_files(self.checkpoints) else None
+            start = EpochStart(leadership.epoch, checkpoint.version if checkpoint is not None else 0)
+            updates = self.path / UPDATES_FOLDER / start.file_name
+            updates.parent.mkdir(exist_ok=True)
+            leadership.replace(updates, lambda temporary: temporary.write_text(start.to_line(), "utf-8"))
+        except OSError as error:
+            raise self._unwritable(error) from error
+        return LedRun(self, leadership, checkpoint, updates)
+
+    def _resume(self, read: Callable[[Path], Checkpoint] | None) -> Checkpoint:
+        """Return the newest checkpoint that can be read; damaged newer ones are set aside, nothing is lost."""
+        checkpoint, damaged = newest_readable(self.checkpoints, read)
+        for file, error in damaged.items():
+            aside = _unused(file.with_name(file.name + DAMAGED_SUFFIX))
+            with suppress(FileNotFoundError):  # a learner of a newer epoch was faster
+                file.rename(aside)
+            _log.warning("%s It is kept as '%s'; going on from version %d.", error, aside, checkpoint.version)
+        return checkpoint
+
+    def _unwritable(self, error: OSError) -> InvalidValueError:
+        return InvalidValueError(
+            f"Cannot write the run folder '{self.path}' ({error.strerror}); mend it or choose another folder."
+        )
+
+
+@dataclass(frozen=True)
+class LedRun:
+    """A run that this process leads."""
+
+    folder: RunFolder
+    leadership: Leadership
+    checkpoint: Checkpoint | None
+    """Where the run goes on from; None for a new run."""
+    updates: Path
+    """The record of this epoch's updates."""
 
 
 def read_config(path: Path) -> RunConfig:
@@ -77,98 +192,25 @@ def read_config(path: Path) -> RunConfig:
         raise DamagedFileError(message) from error
 
 
-@contextmanager
-def open_run_folder(path: Path, config: RunConfig) -> Iterator[RunFolder]:
-    """Make a run folder, or go on with one of the same configuration, and lock it meanwhile.
-
-    Raises:
-        InvalidValueError: The folder holds other files, cannot be written, or another learner uses it.
-        RunMismatchError: The folder's run has another configuration.
-        DamagedFileError: Its configuration, or every checkpoint, cannot be read.
-    """
+def _refuse_foreign(path: Path) -> None:
     try:
-        _refuse_foreign(path)
-        path.mkdir(parents=True, exist_ok=True)
-        lock = FileLock(path / LOCK_FILE, timeout=0)
-        lock.acquire()
-    except Timeout as error:
-        message = f"Another learner is using the run folder '{path}'; stop it or choose another folder."
+        if not path.exists():
+            return
+        names = {entry.name for entry in path.iterdir() if entry.suffix != TEMPORARY_SUFFIX}
+    except NotADirectoryError as error:
+        message = f"'{path}' is a file; choose a folder for the run."
         raise InvalidValueError(message) from error
     except OSError as error:
         message = f"Cannot use '{path}' as a run folder ({error.strerror}); choose another folder."
         raise InvalidValueError(message) from error
-    try:
-        yield _opened(path, config)
-    finally:
-        lock.release()
-
-
-def _refuse_foreign(path: Path) -> None:
-    if not path.exists():
-        return
-    if not path.is_dir():
-        message = f"'{path}' is a file; choose a folder for the run."
-        raise InvalidValueError(message)
     # These are what a learner leaves that was killed before it had written the configuration.
-    names = {entry.name for entry in path.iterdir() if entry.suffix != TEMPORARY_SUFFIX} - {LOCK_FILE}
+    names -= {EPOCHS_FOLDER, EPOCH_FILE, "learner.log"}
     if names and CONFIG_FILE not in names:
         message = f"'{path}' holds files but is not a run; choose an empty or a new folder."
         raise InvalidValueError(message)
-
-
-def _opened(path: Path, config: RunConfig) -> RunFolder:
-    try:
-        return _open_locked(path, config)
-    except OSError as error:
-        message = f"Cannot write the run folder '{path}' ({error.strerror}); mend it or choose another folder."
-        raise InvalidValueError(message) from error
-
-
-def _open_locked(path: Path, config: RunConfig) -> RunFolder:
-    file = path / CONFIG_FILE
-    if file.exists():
-        differences = read_config(path).differences(config)
-        if differences:
-            message = (
-                f"The run in '{path}' has another configuration ({'; '.join(differences)}); "
-                "give the same options as before, or another run folder."
-            )
-            raise RunMismatchError(message)
-    else:
-        text = json.dumps(config.to_json(), indent=2) + "\n"
-        replace_file(file, lambda temporary: temporary.write_text(text, encoding="utf-8"))
-    checkpoint = _resume(path) if checkpoint_files(path / FOLDER) else None
-    epoch = 1 + max(_last_epoch(path), checkpoint.epoch if checkpoint else 0)
-    replace_file(path / EPOCH_FILE, lambda temporary: temporary.write_text(f"{epoch}\n", encoding="utf-8"))
-    return RunFolder(path, config, epoch, checkpoint)
-
-
-def _resume(path: Path) -> Checkpoint:
-    """Return the newest checkpoint that can be read; damaged newer ones are set aside, nothing is lost."""
-    checkpoint, damaged = newest_readable(path / FOLDER)
-    if damaged and (path / UPDATES_FILE).exists():
-        # The learner will cut off the updates after the checkpoint, which may be all that is left of much training.
-        record = _unused(path / f"updates-{max(file.stem for file in damaged)}.jsonl")
-        shutil.copy2(path / UPDATES_FILE, record)
-        _log.warning("the record of updates so far is kept as '%s'", record)
-    for file, error in damaged.items():
-        aside = _unused(file.with_name(file.name + DAMAGED_SUFFIX))
-        file.rename(aside)
-        _log.warning("%s It is kept as '%s'; going on from version %d.", error, aside, checkpoint.version)
-    return checkpoint
 
 
 def _unused(path: Path) -> Path:
     """Return a path where nothing is, by a number at the end of the name if need be."""
     candidates = (path, *(path.with_name(f"{path.name}.{number}") for number in range(2, 1000)))
     return next(candidate for candidate in candidates if not candidate.exists())
-
-
-def _last_epoch(path: Path) -> int:
-    try:
-        return int((path / EPOCH_FILE).read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        return 0
-    except (OSError, ValueError) as error:
-        message = f"Cannot read '{path / EPOCH_FILE}' ({error}); write the number of the run's last epoch into it."
-        raise DamagedFileError(message) from error

@@ -1,21 +1,39 @@
 """`hoz-dist learner`: a learner process that actors, robots and queries connect to."""
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
+from hoz_dist.cli.connecting import keys_option
 from hoz_dist.cli.run_options import run_config, run_options
+from hoz_dist.errors import InvalidValueError
+from hoz_dist.wire.endpoint import DEFAULT_ENCRYPTED_ENDPOINT, DEFAULT_ENDPOINT
+
+if TYPE_CHECKING:
+    from hoz_dist.wire.credentials import Credentials
 
 
 @click.command("learner")
 @click.option(
     "--listen",
     metavar="ENDPOINT",
-    default="tcp/127.0.0.1:7447",
-    show_default=True,
-    help="Endpoint to listen at, protocol/host:port.",
+    help="Endpoint to listen at, as the router of the run, protocol/host:port.  "
+    f"[default: {DEFAULT_ENDPOINT}, with --keys {DEFAULT_ENCRYPTED_ENDPOINT}]",
 )
+@click.option("--connect", metavar="ENDPOINT", help="Endpoint of a router to connect to, instead of listening.")
+@click.option(
+    "--standby",
+    is_flag=True,
+    help="Follow the learner that leads the run, and take over when it is gone; needs --connect and the same run "
+    "folder. Without a leader, lead at once.",
+)
+@click.option(
+    "--name",
+    help="Name of this learner on the network and in the log.  [default: the host's; with --connect and --keys that of "
+    "the key]",
+)
+@keys_option
 @click.option(
     "--run",
     type=click.Path(path_type=Path),
@@ -36,32 +54,45 @@ from hoz_dist.cli.run_options import run_config, run_options
 @click.option(
     "--replay",
     type=click.Path(path_type=Path),
-    help="An updates.jsonl: apply exactly these updates, in this order.  [default: as gradients arrive]",
+    help="The updates folder of a run: apply exactly these updates, in this order.  [default: as gradients arrive]",
 )
 @click.option(
     "--exit-when-done", is_flag=True, help="Exit when the budget is used up.  [default: go on serving graphs]"
 )
 @click.option("--quiet", is_flag=True, help="Print warnings only.  [default: a line every 5 s]")
 def learner_command(
-    listen: str,
+    listen: str | None,
+    connect: str | None,
+    name: str | None,
+    keys: Path | None,
     run: Path,
     checkpoint_seconds: float,
     replay: Path | None,
     *,
+    standby: bool,
     exit_when_done: bool,
     quiet: bool,
     **choices: Any,
 ) -> None:
-    """Apply the gradients of actors, merge their room graphs, and serve parameters, graphs and plans at ENDPOINT.
+    """Apply the gradients of actors, merge their room graphs, and serve parameters, graphs and plans.
 
-    Actors may come and go. SIGINT and SIGTERM stop the learner after a last checkpoint; the same command
-    goes on from it.
+    Actors may come and go. SIGINT and SIGTERM stop the learner after a last checkpoint; the same command goes on from
+    it. Two learners with --standby, the same router and the same run folder take turns when one of them fails.
     """
     import logging
     import signal
     import threading
 
-    # Before the imports that take seconds: it says what is wrong with the options.
+    # Before the imports that take seconds: these say what is wrong with the options.
+    if connect is None:
+        if standby:
+            message = "--standby needs --connect: a learner that listens is a router, and goes when it fails."
+            raise InvalidValueError(message)
+        listen = listen or (DEFAULT_ENDPOINT if keys is None else DEFAULT_ENCRYPTED_ENDPOINT)
+    elif listen is not None:
+        message = "--listen and --connect exclude each other: a learner is a router, or connects to one."
+        raise InvalidValueError(message)
+    credentials, name = _identity(keys, name, role="router" if connect is None else "learner")
     config = run_config(choices)
 
     import torch
@@ -71,6 +102,10 @@ def learner_command(
     torch.set_num_threads(1)  # Actors share the cores, and one thread adds up the same way every time.
     settings = LearnerSettings(
         listen=listen,
+        connect=connect,
+        credentials=credentials,
+        name=name,
+        standby=standby,
         run=run,
         config=config,
         checkpoint_seconds=checkpoint_seconds,
@@ -85,3 +120,30 @@ def learner_command(
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop.set())
     serve(settings, stop)
+
+
+def _identity(keys: Path | None, name: str | None, role: str) -> "tuple[Credentials | None, str]":
+    """Return the keys and the name of this learner.
+
+    Args:
+        keys: Folder of keys; None for none.
+        name: Name that was asked for.
+        role: Role that the keys must be of.
+
+    Raises:
+        HozError: The keys cannot be used, or the name cannot, or is not that of the key.
+    """
+    from hoz_dist.wire.keys import check_name
+    from hoz_dist.wire.liveliness import host_name
+
+    if keys is None:
+        return None, check_name("learner", name or host_name())
+    from hoz_dist.wire.credentials import load_credentials
+
+    credentials = load_credentials(keys, [role])
+    if role != "learner":
+        return credentials, check_name("learner", name or host_name())
+    if name not in (None, credentials.name):
+        message = f"The key in '{keys}' is of the learner '{credentials.name}', not '{name}'; leave out --name."
+        raise InvalidValueError(message)
+    return credentials, credentials.name

@@ -27,7 +27,7 @@ from hoz_dist.wire.messages import Accepted, EpisodesPush, GradientPush, Refused
 from hoz_dist.wire.parameters import Parameters, ParametersFollower
 from hoz_dist.wire.push import Pusher
 from hoz_dist.wire.session import open_client
-from learner.checkpoint import FOLDER, checkpoint_files
+from learner.checkpoint import FOLDER, Stamp, checkpoint_files
 from learner.service import LearnerSettings, catalogue_digests, serve
 
 CONFIG = RunConfig(zones=3)
@@ -183,7 +183,8 @@ def wait_for_checkpoint(run: Path, version: int) -> None:
     """Wait until a checkpoint of that version, or a later one, is there."""
     pause = threading.Event()
     for _ in range(200):
-        if any(int(path.stem) >= version for path in checkpoint_files(run / FOLDER)):
+        stamps = [Stamp.of(path) for path in checkpoint_files(run / FOLDER)]
+        if any(stamp.version >= version for stamp in stamps if stamp is not None):
             return
         pause.wait(0.05)
     message = f"no checkpoint of version {version}"

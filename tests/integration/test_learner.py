@@ -16,6 +16,7 @@ from hoz_dist.client import HozClient
 from hoz_dist.graph.planner import plan_for
 from hoz_dist.graph.scene_graph import merge_rooms
 from hoz_dist.policy.parameters import initial_parameters
+from hoz_dist.wire.liveliness import host_name
 from hoz_dist.wire.messages import Accepted, GradientPush, Refused
 from hoz_dist.wire.rejection import Reason
 from learner.checkpoint import load_checkpoint
@@ -53,7 +54,7 @@ def test_gradients_train_as_in_the_core_alone(free_port: int, tmp_path: Path) ->
     saved = load_checkpoint(run)
     assert (saved.version, saved.frames) == (5, 100)
     assert saved.parameters.tobytes() == core.parameters.tobytes()
-    assert len((run / "updates.jsonl").read_text().splitlines()) == 5
+    assert len(read_updates(run)) == 5
     assert list((run / "tensorboard").glob("events.*"))
 
 
@@ -96,7 +97,7 @@ def test_the_status_tells_who_is_alive_and_what_was_refused(free_port: int, tmp_
     assert [(process["role"], process["id"]) for process in status["processes"]] == [
         ("actor", "anna"),
         ("actor", "ben"),
-        ("learner", "learner"),
+        ("learner", host_name()),
     ]
     anna_status = status["processes"][0]
     assert (anna_status["frames"], anna_status["rejected"]) == (20, 3)
@@ -119,7 +120,7 @@ def test_the_run_ends_with_its_budget_and_says_so(free_port: int, tmp_path: Path
         with HozClient(endpoint) as client:
             status = status_when(client, lambda status: status["finished"])
             assert (status["progress"], status["rejected"]) == (1.0, {})
-    assert (tmp_path / "run" / "checkpoints" / "000000002.keep").exists()
+    assert (tmp_path / "run" / "checkpoints" / "0001-000000002.keep").exists()
 
 
 def test_a_learner_that_exits_when_done_first_tells_its_actors(free_port: int, tmp_path: Path) -> None:
@@ -146,9 +147,7 @@ def test_a_recorded_run_gives_identical_parameters_when_repeated(free_port: int,
             for number, actor in enumerate((anna, ben)):
                 actor.gradient(sequence, (1, 0), gradient_for(start, 10 * number + sequence))
     with (
-        running_learner(
-            free_port, tmp_path / "second", config, replay=tmp_path / "first" / "updates.jsonl"
-        ) as endpoint,
+        running_learner(free_port, tmp_path / "second", config, replay=tmp_path / "first" / "updates") as endpoint,
         FakeActor(endpoint, "second", "anna", incarnation=77) as anna,
         FakeActor(endpoint, "second", "ben", incarnation=78) as ben,
         HozClient(endpoint) as client,
@@ -170,7 +169,7 @@ def test_a_recorded_run_gives_identical_parameters_when_repeated(free_port: int,
 def test_an_actor_that_the_record_does_not_have_is_refused_by_name(free_port: int, tmp_path: Path) -> None:
     with running_learner(free_port, tmp_path / "first") as endpoint, FakeActor(endpoint, "first", "anna") as actor:
         actor.gradient(0, (1, 0), gradient_for(actor.fetch(), 0))
-    record = tmp_path / "first" / "updates.jsonl"
+    record = tmp_path / "first" / "updates" / "epoch-0001.jsonl"
     with (
         running_learner(free_port, tmp_path / "second", replay=record) as endpoint,
         FakeActor(endpoint, "second", "box-4711") as actor,
@@ -208,7 +207,7 @@ def test_a_killed_learner_resumes_and_its_actors_carry_on(free_port: int, tmp_pa
             assert again.stop(signal.SIGTERM) == 0
     saved = load_checkpoint(run)
     assert (saved.epoch, saved.version, saved.frames) == (2, 4, 80)
-    assert len((run / "updates.jsonl").read_text().splitlines()) == 4
+    assert len(read_updates(run)) == 4
     assert (run / "learner.log").read_text().count("listening at") == 2
 
 
@@ -237,7 +236,7 @@ def test_a_full_disk_does_not_stop_the_training_and_is_said_at_the_end(free_port
         assert learner.stop(signal.SIGTERM) == 2
         assert "Cannot save the last checkpoint" in learner.process.stderr.read()
     assert load_checkpoint(run).version == 2
-    assert len(read_updates(run / "updates.jsonl")) == 2
+    assert len(read_updates(run)) == 2
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

@@ -12,6 +12,7 @@ import pytest
 from hoz_dist.client import HozClient
 from hoz_dist.errors import HozError
 from learner.checkpoint import Checkpoint, load_checkpoint
+from learner.replay import read_updates
 from learner.run_folder import read_config
 from tests.integration.commands import SMALL_ROOMS, HozDist, children_of, hoz_dist, until
 from tests.integration.learning import LearnerProcess
@@ -60,7 +61,7 @@ def test_a_run_folder_has_all_that_a_person_wants_to_look_at(trained: Path) -> N
     assert (trained / "zones-bathroom.png").read_bytes().startswith(b"\x89PNG")
     assert "listening at" in (trained / "learner.log").read_text()
     assert (trained / "actor-0.log").read_text().endswith("the run is over\n")
-    assert len((trained / "updates.jsonl").read_text().splitlines()) == checkpoint.version
+    assert len(read_updates(trained)) == checkpoint.version
 
 
 def test_a_finished_run_is_not_trained_again(trained: Path, cache: Path) -> None:
@@ -70,7 +71,7 @@ def test_a_finished_run_is_not_trained_again(trained: Path, cache: Path) -> None
     assert f"The run in {trained} has used up its budget" in result.stdout
     after = load_checkpoint(trained)
     assert_same_training(before, after)
-    assert len((trained / "updates.jsonl").read_text().splitlines()) == after.version
+    assert len(read_updates(trained)) == after.version
 
 
 def test_another_configuration_is_refused_by_name_and_nothing_is_written(trained: Path, cache: Path) -> None:
@@ -92,7 +93,7 @@ def test_one_actor_and_one_seed_give_identical_parameters_again(trained: Path, c
 def test_a_recorded_run_is_repeated_by_a_learner_and_an_actor(
     trained: Path, cache: Path, free_port: int, tmp_path: Path
 ) -> None:
-    run, updates = tmp_path / "again", trained / "updates.jsonl"
+    run, updates = tmp_path / "again", trained / "updates"
     options = ("--seed", "3", "--zones", "8", "--replay", str(updates), "--exit-when-done")
     rooms = [word for room in SMALL_ROOMS for word in ("--scene", room)]
     with LearnerProcess(free_port, run, *options).ready() as learner:

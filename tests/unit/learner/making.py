@@ -1,5 +1,7 @@
 """Makes the messages, graphs and cores that the learner's tests work with."""
 
+from pathlib import Path
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,6 +13,7 @@ from hoz_dist.nav.rooms import RoomId
 from hoz_dist.wire.messages import EpisodesPush, GradientPush, RoomGraphPush
 from learner.core import LearnerCore
 from learner.events import Effect, Event, GradientReceived, Reply
+from learner.leadership import Leadership, claim, newest_epoch
 
 SIZE = 11
 ZONES = 3
@@ -79,6 +82,13 @@ def answer(core: LearnerCore, event: Event, now: float = 0.0) -> object:
 
 def replies(effects: list[Effect]) -> list[Reply]:
     return [effect for effect in effects if isinstance(effect, Reply)]
+
+
+def leading(run: Path) -> Leadership:
+    """Lead a run folder in the epoch after the newest."""
+    leadership = claim(run, newest_epoch(run))
+    assert leadership is not None
+    return leadership
 
 
 def push(core: LearnerCore, *pushes: GradientPush, now: float = 0.0) -> list[object]:

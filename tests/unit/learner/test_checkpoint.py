@@ -9,11 +9,12 @@ import pytest
 from safetensors.numpy import load_file, save_file
 
 from hoz_dist.errors import DamagedFileError, InvalidValueError, NotFoundError
-from learner.checkpoint import Checkpoint, checkpoint_files, load_checkpoint, save_checkpoint
+from learner.checkpoint import Checkpoint, Stamp, checkpoint_files, load_checkpoint, save_checkpoint
 from learner.core import LearnerCore
 from learner.events import EpisodesReceived, RoomGraphReceived
+from learner.leadership import DeposedError
 from tests.unit.learner.disk import full_disk
-from tests.unit.learner.making import CONFIG, answer, episodes, gradient, push, room_graph, room_push, vector
+from tests.unit.learner.making import CONFIG, answer, episodes, gradient, leading, push, room_graph, room_push, vector
 
 
 @pytest.fixture
@@ -30,6 +31,10 @@ def with_version(checkpoint: Checkpoint, version: int) -> Checkpoint:
     return replace(checkpoint, version=version)
 
 
+def versions(folder: Path) -> list[int]:
+    return [stamp.version for path in checkpoint_files(folder) if (stamp := Stamp.of(path)) is not None]
+
+
 def damage(path: Path) -> None:
     content = bytearray(path.read_bytes())
     content[-9] ^= 1
@@ -38,7 +43,7 @@ def damage(path: Path) -> None:
 
 def test_a_checkpoint_comes_back_as_it_was(tmp_path: Path, checkpoint: Checkpoint) -> None:
     path = save_checkpoint(tmp_path / "checkpoints", checkpoint)
-    assert path.name == "000000002.safetensors"
+    assert path.name == "0003-000000002.safetensors"
     again = load_checkpoint(path)
     for name in ("config", "epoch", "version", "frames", "episodes", "seconds", "graph_versions", "recent", "seen"):
         assert getattr(again, name) == getattr(checkpoint, name), name
@@ -65,13 +70,39 @@ def test_its_scene_graphs_are_those_of_the_run(tmp_path: Path, checkpoint: Check
 def test_the_newest_three_and_those_to_keep_stay(tmp_path: Path, checkpoint: Checkpoint) -> None:
     for version in range(1, 9):
         save_checkpoint(tmp_path, with_version(checkpoint, version), keep=version in {2, 5})
-    assert [int(path.stem) for path in checkpoint_files(tmp_path)] == [8, 7, 6, 5, 2]
+    assert versions(tmp_path) == [8, 7, 6, 5, 2]
 
 
-def test_what_a_killed_process_left_half_written_is_cleared_away(tmp_path: Path, checkpoint: Checkpoint) -> None:
-    (tmp_path / "000000001.safetensors.tmp").write_bytes(b"half")
-    path = save_checkpoint(tmp_path, checkpoint)
-    assert list(tmp_path.iterdir()) == [path]
+def test_of_a_finished_run_that_is_opened_again_and_again_the_last_end_is_kept(
+    tmp_path: Path, checkpoint: Checkpoint
+) -> None:
+    for epoch in range(1, 9):
+        save_checkpoint(tmp_path, replace(checkpoint, epoch=epoch, version=9), keep=True)
+    assert [Stamp.of(path) for path in checkpoint_files(tmp_path)] == [(8, 9), (7, 9), (6, 9), (5, 9)]
+    assert len(list(tmp_path.glob("*.keep"))) == 4
+
+
+def test_a_later_epoch_comes_after_an_earlier_one_whatever_the_versions(tmp_path: Path, checkpoint: Checkpoint) -> None:
+    for epoch, version in ((9, 30), (10, 20), (11, 25), (10, 22)):
+        save_checkpoint(tmp_path, replace(checkpoint, epoch=epoch, version=version), keep=True)
+    (tmp_path / "000000099.safetensors").touch()
+    (tmp_path / "notes-1.safetensors").touch()
+    assert [Stamp.of(path) for path in checkpoint_files(tmp_path)] == [(11, 25), (10, 22), (10, 20), (9, 30)]
+    assert load_checkpoint(tmp_path).version == 25
+
+
+def test_a_deposed_learner_saves_and_deletes_nothing(tmp_path: Path, checkpoint: Checkpoint) -> None:
+    folder = tmp_path / "checkpoints"
+    with leading(tmp_path) as old:
+        for version in range(1, 6):
+            save_checkpoint(folder, with_version(checkpoint, version), keep=version == 2, files=old)
+        before = sorted(folder.iterdir())
+        with leading(tmp_path):
+            for keep in (False, True):
+                with pytest.raises(DeposedError):
+                    save_checkpoint(folder, with_version(checkpoint, 6), keep=keep, files=old)
+            assert sorted(folder.iterdir()) == before
+    assert versions(folder) == [5, 4, 3, 2]
 
 
 def test_a_full_disk_leaves_the_older_checkpoint_and_nothing_half_written(
@@ -163,7 +194,7 @@ def test_after_a_fall_back_the_new_checkpoint_is_not_the_one_that_is_deleted(
 ) -> None:
     for version in (7, 8, 9):
         damage(save_checkpoint(tmp_path, with_version(checkpoint, version)))
-    path = save_checkpoint(tmp_path, with_version(checkpoint, 5))
+    path = save_checkpoint(tmp_path, replace(checkpoint, epoch=4, version=5))
     assert load_checkpoint(tmp_path).version == 5
     assert path.exists()
 

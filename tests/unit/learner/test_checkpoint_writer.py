@@ -1,16 +1,18 @@
 import logging
 import threading
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from hoz_dist.errors import HozError
-from learner.checkpoint import Checkpoint, checkpoint_files
+from learner.checkpoint import Checkpoint, Stamp, checkpoint_files
 from learner.checkpoint_writer import RETRY_S, CheckpointWriter
 from learner.core import LearnerCore
+from learner.leadership import DeposedError
 from tests.unit.learner.disk import full_disk
-from tests.unit.learner.making import CONFIG, vector
+from tests.unit.learner.making import CONFIG, leading, vector
 
 WAIT_S = 10.0
 
@@ -20,17 +22,18 @@ class Run:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self.writer = CheckpointWriter(folder, self.snapshot)
+        self.leadership = leading(folder)
+        self.writer = CheckpointWriter(folder, self.snapshot, self.leadership)
         self._checkpoint = LearnerCore(CONFIG, vector(0)).snapshot(0.0)
 
     def snapshot(self, now: float) -> Checkpoint:
         return replace(self._checkpoint, version=int(now))
 
     def versions(self) -> list[int]:
-        return [int(path.stem) for path in checkpoint_files(self.folder)]
+        return [stamp.version for path in checkpoint_files(self.folder) if (stamp := Stamp.of(path)) is not None]
 
     def kept(self) -> list[int]:
-        return sorted(int(path.stem) for path in self.folder.glob("*.keep"))
+        return sorted(int(path.stem.partition("-")[2]) for path in self.folder.glob("*.keep"))
 
     def settle(self, now: float) -> None:
         """Wait until what is being written is written, and tell the writer."""
@@ -41,15 +44,17 @@ class Run:
 
 
 @pytest.fixture
-def run(tmp_path: Path) -> Run:
-    return Run(tmp_path)
+def run(tmp_path: Path) -> Iterator[Run]:
+    run = Run(tmp_path)
+    yield run
+    run.leadership.close()
 
 
 def test_a_save_is_written_beside_the_training(run: Run) -> None:
     run.writer.save(1.0, keep=False)
     run.settle(2.0)
     assert (run.versions(), run.kept()) == ([1], [])
-    assert run.writer.close(3.0).name == "000000003.safetensors"
+    assert run.writer.close(3.0).name == "0001-000000003.safetensors"
     assert run.versions() == [3, 1]
 
 
@@ -94,3 +99,16 @@ def test_what_was_to_be_kept_and_failed_is_kept_at_the_stop(run: Run) -> None:
 def test_a_last_checkpoint_that_cannot_be_written_is_said_in_one_sentence(run: Run) -> None:
     with full_disk(1000), pytest.raises(HozError, match=r"Cannot save the last checkpoint in '.*' \(.+\); make room"):
         run.writer.close(1.0)
+
+
+def test_a_deposed_learner_saves_nothing_and_does_not_try_again(run: Run, caplog: pytest.LogCaptureFixture) -> None:
+    with leading(run.folder):
+        run.writer.save(1.0, keep=True)
+        run.settle(2.0)
+        run.writer.poll(2.0 + 2 * RETRY_S)
+        run.settle(3.0 + 2 * RETRY_S)
+        assert run.versions() == run.kept() == []
+        assert [record.levelname for record in caplog.records] == ["WARNING"]
+        with pytest.raises(DeposedError):
+            run.writer.close(20.0)
+    assert run.versions() == run.kept() == []

@@ -9,7 +9,7 @@ from hoz_dist.errors import InvalidValueError
 from learner.core import LearnerCore
 from learner.events import EpisodesReceived
 from learner.recorder import RETRY_RECORDS, ScalarRecorder, UpdateLog
-from learner.replay import UpdateRecord, read_updates
+from learner.replay import EpochStart, UpdateRecord, read_updates
 from tests.unit.learner.disk import full_disk
 from tests.unit.learner.making import CONFIG, answer, episodes, gradient, push, vector
 
@@ -18,34 +18,27 @@ def record(sequence: int) -> UpdateRecord:
     return UpdateRecord("a", 1, sequence, sequence, 0, 0.1)
 
 
-def write(path: Path, version: int, *records: UpdateRecord) -> None:
-    log = UpdateLog(path, version)
-    for item in records:
-        log.write(item)
-    log.flush()
-    log.close()
+def begun(path: Path, epoch: int = 1, version: int = 0) -> Path:
+    """A record in which nothing is yet but how it began."""
+    path.write_text(EpochStart(epoch, version).to_line())
+    return path
 
 
-def test_updates_that_a_killed_learner_lost_are_cut_off(tmp_path: Path) -> None:
-    path = tmp_path / "updates.jsonl"
-    write(path, 0, *map(record, range(5)))
-    with path.open("a") as file:
-        file.write(record(5).to_line()[:-20])  # it was killed in the middle of a line
-    write(path, 3, record(77))
-    assert read_updates(path) == [record(0), record(1), record(2), record(77)]
-
-
-def test_a_record_that_was_deleted_begins_again(tmp_path: Path) -> None:
-    path = tmp_path / "updates.jsonl"
-    write(path, 9, record(9))
-    assert read_updates(path) == [record(9)]
+def test_updates_are_added_after_what_is_there(tmp_path: Path) -> None:
+    path = begun(tmp_path / "epoch-0001.jsonl")
+    for number in range(3):
+        log = UpdateLog(path)
+        log.write(record(number))
+        log.flush()
+        log.close()
+    assert read_updates(path) == [record(0), record(1), record(2)]
 
 
 def test_updates_that_a_full_disk_did_not_take_are_written_later_and_none_twice(tmp_path: Path) -> None:
-    path = tmp_path / "updates.jsonl"
-    log = UpdateLog(path, 0)
-    length = len(record(0).to_line())
-    with full_disk(int(2.5 * length)):
+    path = begun(tmp_path / "epoch-0001.jsonl")
+    log = UpdateLog(path)
+    length, start = len(record(0).to_line()), path.stat().st_size
+    with full_disk(start + int(2.5 * length)):
         for sequence in range(4):
             log.write(record(sequence))
             if sequence < 2:
@@ -63,7 +56,7 @@ def test_updates_that_a_full_disk_did_not_take_are_written_later_and_none_twice(
 
 def test_a_record_that_cannot_be_written_is_said_in_one_sentence(tmp_path: Path) -> None:
     with pytest.raises(InvalidValueError, match="Cannot write"):
-        UpdateLog(tmp_path, 0)
+        UpdateLog(tmp_path)
 
 
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")  # of TensorBoard's own thread

@@ -1,0 +1,145 @@
+import threading
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hoz_dist.errors import RunMismatchError
+from learner.checkpoint import save_checkpoint
+from learner.core import LearnerCore
+from learner.run_folder import RunFolder
+from learner.standby import FREE_S, RECONNECTED_S, STILL_S, STOOD_STILL_S, ReadAhead, Sight, TakeOverRule, follow
+from tests.unit.learner.making import CONFIG, gradient, push, vector
+
+STEP_S = 0.05
+CUT = Sight(connected=False, leader=False)
+LED = Sight(connected=True, leader=True)
+KILLED = Sight(connected=True, leader=False, epoch=1, held=False)
+STILL = Sight(connected=True, leader=False, epoch=1, held=True)
+
+
+class Standby:
+    """Looks every 50 ms, and notes when it would have taken over."""
+
+    def __init__(self) -> None:
+        self.rule = TakeOverRule()
+        self.now = 0.0
+
+    def sees(self, sight: Sight, seconds: float) -> float | None:
+        """See something for some time; return after how many seconds it took over."""
+        start = self.now
+        while self.now < start + seconds:
+            if self.rule.is_time(sight, self.now):
+                return self.now - start
+            self.now += STEP_S
+        return None
+
+
+def test_it_never_takes_over_while_there_is_a_leader_or_no_network() -> None:
+    standby = Standby()
+    for sight in (LED, CUT, LED, CUT):
+        assert standby.sees(sight, 60.0) is None
+
+
+def test_a_killed_leader_is_followed_at_once() -> None:
+    standby = Standby()
+    standby.sees(LED, 10.0)
+    assert standby.sees(KILLED, 10.0) == pytest.approx(FREE_S, abs=0.1)
+
+
+def test_one_that_stands_still_is_given_time_to_come_back() -> None:
+    standby = Standby()
+    standby.sees(LED, 10.0)
+    assert standby.sees(STILL, STILL_S - 0.2) is None
+    standby.sees(LED, 1.0)
+    assert standby.sees(STILL, 10.0) == pytest.approx(STILL_S, abs=0.1)
+
+
+def test_after_the_routers_restart_the_others_have_time_to_come_back() -> None:
+    standby = Standby()
+    standby.sees(LED, 10.0)
+    assert standby.sees(STILL, 0.1) is None  # the tokens go before the connection does
+    standby.sees(CUT, 30.0)
+    assert standby.sees(STILL, RECONNECTED_S - 0.2) is None
+    standby.sees(LED, 1.0)
+    standby.sees(CUT, 3.0)
+    assert standby.sees(STILL, 10.0) == pytest.approx(RECONNECTED_S, abs=0.1)
+
+
+def test_a_standby_that_starts_without_a_leader_leads_at_once() -> None:
+    assert Standby().sees(Sight(connected=True, leader=False), 10.0) == pytest.approx(FREE_S, abs=0.1)
+
+
+def test_who_claims_an_epoch_has_time_to_show_its_token() -> None:
+    standby = Standby()
+    standby.sees(LED, 1.0)
+    standby.sees(STILL, STILL_S - 0.2)
+    assert standby.sees(STILL._replace(epoch=2), STILL_S - 0.2) is None
+    assert standby.sees(STILL._replace(epoch=2), 1.0) == pytest.approx(0.2, abs=0.1)
+
+
+def test_a_standby_that_stood_still_itself_believes_nothing_that_it_saw_before() -> None:
+    standby = Standby()
+    standby.sees(LED, 1.0)
+    standby.sees(STILL, STILL_S - 0.2)
+    standby.now += STOOD_STILL_S + 0.1
+    assert standby.sees(STILL, 10.0) == pytest.approx(RECONNECTED_S, abs=0.1)
+
+
+def saved(folder: Path, updates: int, epoch: int = 1) -> Path:
+    core = LearnerCore(CONFIG, vector(0), epoch=epoch)
+    push(core, *(gradient(number, epoch=epoch, version=number) for number in range(updates)))
+    return save_checkpoint(folder, core.snapshot(0.0))
+
+
+def test_a_checkpoint_is_read_ahead_and_again_only_when_it_is_another(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ahead = ReadAhead(tmp_path)
+    ahead.refresh()  # there is none
+    first = saved(tmp_path, 1)
+    ahead.refresh()
+    assert ahead.read(first) is ahead.read(first)
+    assert ahead.read(first).version == 1
+    before = ahead.read(first)
+    assert saved(tmp_path, 1) == first  # the same version again, with another content
+    ahead.refresh()
+    assert ahead.read(first) is not before
+    second = saved(tmp_path, 2)
+    damaged = saved(tmp_path, 3)
+    damaged.write_bytes(b"damaged")
+    ahead.refresh()
+    assert ahead.read(second).version == 2
+    np.testing.assert_array_equal(ahead.read(first).parameters, before.parameters)
+
+
+def test_following_ends_with_the_leadership_of_the_next_epoch(tmp_path: Path) -> None:
+    folder = RunFolder(tmp_path, CONFIG)
+    with folder.claim_or_refuse() as first:
+        folder.take_over(first)
+    leadership = follow(folder, lambda: (True, False), ReadAhead(folder.checkpoints), threading.Event())
+    assert leadership is not None
+    with leadership:
+        assert leadership.epoch == 2
+
+
+def test_following_can_be_stopped(tmp_path: Path) -> None:
+    folder, stop = RunFolder(tmp_path, CONFIG), threading.Event()
+    looks = iter(range(5))
+
+    def sight() -> tuple[bool, bool]:
+        if next(looks) == 4:
+            stop.set()
+        return True, True
+
+    assert follow(folder, sight, ReadAhead(folder.checkpoints), stop) is None
+
+
+def test_a_run_that_another_configuration_has_begun_is_not_claimed(tmp_path: Path) -> None:
+    with RunFolder(tmp_path, CONFIG).claim_or_refuse() as first:
+        RunFolder(tmp_path, CONFIG).take_over(first)
+    folder = RunFolder(tmp_path, replace(CONFIG, seed=9))
+    with pytest.raises(RunMismatchError, match="seed"):
+        follow(folder, lambda: (True, False), ReadAhead(folder.checkpoints), threading.Event())
+    assert folder.newest_epoch() == 1
