@@ -16,7 +16,13 @@ from zenoh import Session
 
 from hoz_dist.errors import ConnectionFailedError, DamagedFileError, InvalidValueError, NotFoundError
 from hoz_dist.wire.endpoint import check_endpoint, is_encrypted
-from hoz_dist.wire.settings import CLIENT_LEASE_MS, client_settings, router_settings, tls_settings
+from hoz_dist.wire.settings import (
+    CLIENT_LEASE_MS,
+    client_settings,
+    router_settings,
+    shared_memory_settings,
+    tls_settings,
+)
 from hoz_dist.wire.waiting import Deadline, StoppedError
 
 if TYPE_CHECKING:
@@ -31,7 +37,9 @@ _ATTEMPT_S: Final = 2.0
 """How long Zenoh tries without a look at the stop event."""
 
 
-def open_router(listen: str | Sequence[str], credentials: "Credentials | None" = None) -> Session:
+def open_router(
+    listen: str | Sequence[str], credentials: "Credentials | None" = None, *, shared_memory: bool = False
+) -> Session:
     """Open a session that is a router: others connect to it. Use it in a ``with`` statement.
 
     What the session itself sends and receives does not pass the access control.
@@ -39,6 +47,7 @@ def open_router(listen: str | Sequence[str], credentials: "Credentials | None" =
     Args:
         listen: Endpoint to listen at, or several.
         credentials: Keys of a router, with its access control; None for a router that lets everybody in.
+        shared_memory: Whether messages may pass through shared memory; see `SharedMemory.on`.
 
     Raises:
         InvalidValueError: An endpoint is malformed, or is none for the credentials.
@@ -50,6 +59,8 @@ def open_router(listen: str | Sequence[str], credentials: "Credentials | None" =
     for endpoint in endpoints:
         _check_protection(check_endpoint(endpoint), credentials)
     settings = router_settings() | {"listen/endpoints": endpoints}
+    if shared_memory:
+        settings |= shared_memory_settings()
     if credentials is not None:
         access_control = _read_config(credentials.router_file).get_json("access_control")
         settings |= _keys(credentials) | {"access_control": json.loads(access_control)}
@@ -81,6 +92,8 @@ def open_client(
     stop: threading.Event | None = None,
     credentials: "Credentials | None" = None,
     lease_ms: int = CLIENT_LEASE_MS,
+    *,
+    shared_memory: bool = False,
 ) -> Session:
     """Open a session as a client of a router. Use it in a ``with`` statement.
 
@@ -92,6 +105,7 @@ def open_client(
         stop: Ends the wait early.
         credentials: Keys of this process; None where no router asks for them.
         lease_ms: Silence after which the router gives this process up, milliseconds.
+        shared_memory: Whether messages may pass through shared memory; see `SharedMemory.on`.
 
     Raises:
         InvalidValueError: The endpoint is malformed, or is none for the credentials.
@@ -101,6 +115,8 @@ def open_client(
     endpoint, deadline = check_endpoint(connect), Deadline(timeout_s)
     _check_protection(endpoint, credentials)
     settings = client_settings(lease_ms) | {"connect/endpoints": [endpoint]}
+    if shared_memory:
+        settings |= shared_memory_settings()
     if credentials is not None:
         settings |= _keys(credentials)
     while True:

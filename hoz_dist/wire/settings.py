@@ -16,7 +16,7 @@ _COMMON: Final[dict[str, Any]] = {
     "scouting/multicast/enabled": False,
     "scouting/gossip/enabled": False,
     "scouting/delay": 0,  # nothing is scouted for; a router would wait half a second for it all the same
-    # Plain bytes: implicit shared memory leaks segments of killed processes, and serves messages up to 16 MB only.
+    # On where it is wanted; see `shared_memory_settings`.
     "transport/shared_memory/enabled": False,
     # The priority of questions and answers. 16 batches of 64 KiB hold a shard of 512 KiB: a router that forwards one to
     # a client that stands still must not wait for it, because everybody else would wait too.
@@ -44,6 +44,17 @@ def client_settings(lease_ms: int) -> dict[str, Any]:
         "mode": "client",
         "connect/retry": {"period_init_ms": 200, "period_max_ms": 2000, "period_increase_factor": 2},
         "transport/link/tx/lease": lease_ms,
+    }
+
+
+def shared_memory_settings() -> dict[str, Any]:
+    """Return the settings with which a session takes messages through shared memory.
+
+    Only those that a sender puts there: Zenoh's own choice of messages knows no bound and no fall-back of ours.
+    """
+    return {
+        "transport/shared_memory/enabled": True,
+        "transport/shared_memory/transport_optimization/enabled": False,
     }
 
 
