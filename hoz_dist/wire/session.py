@@ -134,7 +134,8 @@ def open_client(
 def is_connected(session: Session) -> bool:
     """Tell whether a client's session has a router at the moment.
 
-    A killed router is noticed at once, one that stands still after its lease.
+    A killed router is noticed at once, one that stands still after its lease; later while megabytes are on the way to
+    it.
     """
     return bool(session.info.routers_zid())
 

@@ -12,6 +12,16 @@ SERVICE_LEASE_MS: Final = 2000
 CLIENT_LEASE_MS: Final = 5000
 """Actors and clients: they may be behind a link that loses packets, and stand still for seconds."""
 
+_WAIT: Final = "transport/link/tx/queue/congestion_control/block/wait_before_close"
+"""How long a send waits for a receiver that takes nothing before it closes the connection, microseconds."""
+_ROUTER_WAIT_US: Final = 1_500_000
+"""Less than the lease. While a router waits for one client it does not hear the one whose message it forwards: with a
+wait of 10 s, a client that stood still with 16 MB on the way held up all others for 6.5 s, and the learner was given up
+as silent; with 1.5 s, for 1.5 s, and nobody was. A client at 0.6 Mbit/s still gets shards of 512 KiB."""
+_CLIENT_WAIT_US: Final = 5_000_000
+"""A client waits in its own thread alone, and a slow link may take nothing for seconds. Not longer: a client with 40 MB
+on the way to a router that stood still for 6 s was back at once with 5 s, and after 10 s with 10 s."""
+
 _COMMON: Final[dict[str, Any]] = {
     "scouting/multicast/enabled": False,
     "scouting/gossip/enabled": False,
@@ -21,8 +31,6 @@ _COMMON: Final[dict[str, Any]] = {
     # The priority of questions and answers. 16 batches of 64 KiB hold a shard of 512 KiB: a router that forwards one to
     # a client that stands still must not wait for it, because everybody else would wait too.
     "transport/link/tx/queue/size/data": 16,
-    # A receiver that takes nothing for this long loses the transport, and with it what was in flight (5 s by default).
-    "transport/link/tx/queue/congestion_control/block/wait_before_close": 10_000_000,
     "transport/link/rx/buffer_size": 4 * 1024 * 1024,
     "transport/link/rx/max_message_size": 128 * 1024 * 1024,
 }
@@ -35,6 +43,7 @@ def router_settings() -> dict[str, Any]:
         "listen/exit_on_failure": True,
         "listen/timeout_ms": 0,
         "transport/link/tx/lease": SERVICE_LEASE_MS,
+        _WAIT: _ROUTER_WAIT_US,
     }
 
 
@@ -44,6 +53,7 @@ def client_settings(lease_ms: int) -> dict[str, Any]:
         "mode": "client",
         "connect/retry": {"period_init_ms": 200, "period_max_ms": 2000, "period_increase_factor": 2},
         "transport/link/tx/lease": lease_ms,
+        _WAIT: _CLIENT_WAIT_US,
     }
 
 
