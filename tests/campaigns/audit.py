@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, NamedTuple
 
+from hoz_dist.wire.message import MAX_EPISODES
 from learner.checkpoint import Checkpoint, load_checkpoint
 from learner.deduplication import SeenPushes, Sender
 from learner.replay import read_updates
@@ -85,6 +86,7 @@ def audit(run: Path, pushes: Sequence[Acknowledged]) -> Audit:
             ),
             *_forgotten(covered, checkpoint),
             *_repeated(pushes),
+            *_miscounted(pushes, covered, record, checkpoint),
         ],
     )
     return Audit(figures, record, gradients)
@@ -143,3 +145,35 @@ def _repeated(pushes: Iterable[Acknowledged]) -> list[str]:
     """Name the pushes that an actor was told twice about: it must not send what was acknowledged."""
     counts = Counter((push.kind, *_identity(push)) for push in pushes)
     return [f"{push} was acknowledged {count} times" for push, count in counts.items() if count > 1]
+
+
+def _miscounted(
+    pushes: Sequence[Acknowledged],
+    covered: Sequence[Acknowledged],
+    record: Counter[Identity],
+    checkpoint: Checkpoint,
+) -> list[str]:
+    """Name the counters that are not what the pushes add up to.
+
+    Of a push whose actor was killed before it heard of it nobody wrote down how much it counted, only
+    that it was taken.
+    """
+    frames = {_identity(push): push.frames for push in pushes if push.kind == "gradient"}
+    known = sum(frames.get(identity, 0) for identity in record)
+    most_frames = checkpoint.config.batch * checkpoint.config.rollout_steps
+    unknown = sum(identity not in frames for identity in record)
+    least_episodes = sum(push.episodes for push in covered)
+    most_episodes = sum(push.episodes for push in pushes) + MAX_EPISODES * _unheard_episodes(pushes, checkpoint)
+    problems = []
+    if not known <= checkpoint.frames <= known + unknown * most_frames:
+        problems.append(f"{checkpoint.frames} frames were counted, not {known} and those of {unknown} gradients")
+    if not least_episodes <= checkpoint.episodes <= most_episodes:
+        problems.append(f"{checkpoint.episodes} episodes were counted, not {least_episodes} to {most_episodes}")
+    return problems
+
+
+def _unheard_episodes(pushes: Sequence[Acknowledged], checkpoint: Checkpoint) -> int:
+    """Return the number of pushes of episodes that were taken without the actor's knowing; one for each at most."""
+    heard = {_identity(push) for push in pushes if push.kind == "episodes"}
+    senders = [row for row in checkpoint.seen if row[0] == "episodes"]
+    return sum((actor, incarnation, newest) not in heard for _, actor, incarnation, newest, _ in senders)

@@ -67,12 +67,7 @@ class Cluster:
 
     def acknowledged(self, *actors: str) -> list[Acknowledged]:
         """Return all pushes of actors that were acknowledged so far."""
-        return [
-            push
-            for actor in actors
-            if self.journal(actor).exists()
-            for push in read_journal(self.journal(actor), actor)
-        ]
+        return [push for actor in actors if self.journal(actor).exists() for push in read_journal(self.journal(actor))]
 
     def _program(self, name: str, *words: str) -> Program:
         return Program(name, words, self._place(name))

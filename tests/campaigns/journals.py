@@ -30,16 +30,19 @@ class Acknowledged(NamedTuple):
     """Epoch of the learner that accepted it."""
     version: int
     """Version of the parameters at the answer, so not less than the one that a gradient made."""
-    frames: int
+    frames: int = 0
+    """Of a gradient."""
+    episodes: int = 0
+    """Number of them."""
 
 
-def read_journal(path: Path, actor: str) -> list[Acknowledged]:
+def read_journal(path: Path) -> list[Acknowledged]:
     """Read an actor's journal; a line that a killed actor did not finish is left out."""
     pushes = []
     for line in path.read_text(encoding="utf-8").splitlines(keepends=True):
         if line.endswith("\n"):
             values = json.loads(line)
-            pushes.append(Acknowledged(actor, **{name: values[name] for name in Acknowledged._fields[1:]}))
+            pushes.append(Acknowledged(**{name: values[name] for name in Acknowledged._fields if name in values}))
     return pushes
 
 

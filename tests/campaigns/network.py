@@ -63,7 +63,10 @@ class NetworkFigures:
     far_heals_seconds: float | None
     """The same; an answer that refuses counts as well. None when its link was not cut."""
     audit: AuditFigures
-    problems: list[str] = field(default_factory=list)
+    wrong: list[str] = field(default_factory=list)
+    """What must never be; empty when all is well."""
+    late: list[str] = field(default_factory=list)
+    """What takes longer than it may."""
 
     def to_json(self) -> dict[str, Any]:
         """Return the figures."""
@@ -121,14 +124,14 @@ def network(folder: Path, cache: Path, settings: Settings) -> NetworkFigures:
         far_heals_seconds=None if far_heals is None else round(far_heals, 1),
         audit=audit(cluster.run, pushes).figures,
     )
-    figures.problems.extend(figures.audit.problems)
-    figures.problems.extend(f"{name} was started again" for name in restarted)
+    figures.wrong.extend(figures.audit.problems)
+    figures.wrong.extend(f"{name} was started again" for name in restarted)
     if figures.near_frames_per_second < SHARE * figures.near_frames_per_second_alone:
-        figures.problems.append("the far actor slows the near one down")
+        figures.late.append("the far actor slows the near one down")
     if figures.far_refused.keys() - {"stale", "epoch"}:
-        figures.problems.append(f"gradients of the far actor were refused: {figures.far_refused}")
+        figures.wrong.append(f"gradients of the far actor were refused: {figures.far_refused}")
     if figures.near_heals_seconds > HEAL_S:
-        figures.problems.append(f"the near actor went on only after {figures.near_heals_seconds} s")
+        figures.late.append(f"the near actor went on only after {figures.near_heals_seconds} s")
     return figures
 
 

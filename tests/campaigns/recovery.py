@@ -33,7 +33,6 @@ MEDIAN_S: Final = 10.0
 LONGEST_S: Final = 20.0
 TAKE_OVER_S: Final = 5.0
 BEFORE_S: Final = 10.0
-"""How long before a fault frames per second are measured."""
 GIVE_UP_S: Final = 60.0
 RESTART_S: Final = 0.3
 LEARNERS: Final = ("learner-a", "learner-b")
@@ -61,7 +60,8 @@ class RecoveryFigures:
     frames_per_second: float
     """The median second before the faults."""
     recoveries: list[Recovery]
-    problems: list[str] = field(default_factory=list)
+    late: list[str] = field(default_factory=list)
+    """What takes longer than it may."""
 
     def to_json(self) -> dict[str, Any]:
         """Return the figures, by target and kind."""
@@ -73,11 +73,17 @@ class RecoveryFigures:
             for key, value in kept.items():
                 if value is not None:
                     faults.setdefault(name, {}).setdefault(key, []).append(round(value, 1))
-        return {"frames_per_second": self.frames_per_second, "faults": faults, "problems": self.problems}
+        return {"frames_per_second": self.frames_per_second, "faults": faults, "late": self.late}
 
 
 def recovery(
-    folder: Path, cache: Path, port: int, targets: Sequence[Target], kinds: Sequence[Kind] = KINDS, repeats: int = 5
+    folder: Path,
+    cache: Path,
+    port: int,
+    targets: Sequence[Target],
+    kinds: Sequence[Kind] = KINDS,
+    repeats: int = 5,
+    before_s: float = BEFORE_S,
 ) -> RecoveryFigures:
     """Bring about each fault so many times, one after another.
 
@@ -88,6 +94,7 @@ def recovery(
         targets: What to hit.
         kinds: What to do to it.
         repeats: How often.
+        before_s: How long before a fault frames per second are measured.
     """
     prepare_views(cache)
     alone = [target for target in targets if target == "learner"]
@@ -99,7 +106,7 @@ def recovery(
     ):
         if not some:
             continue
-        with _Service(folder / name, cache, port, learners).running() as service:
+        with _Service(folder / name, cache, port, learners, before_s).running() as service:
             for _ in range(repeats):
                 recoveries += [service.hit(target, kind) for kind in kinds for target in some]
             rates.append(service.frames_per_second)
@@ -107,19 +114,19 @@ def recovery(
     for target in targets:
         for kind in kinds:
             some_recoveries = [one for one in recoveries if (one.target, one.kind) == (target, kind)]
-            figures.problems.extend(_problems(f"{target} {kind}", target, some_recoveries))
+            figures.late.extend(_late(f"{target} {kind}", target, some_recoveries))
     return figures
 
 
-def _problems(name: str, target: Target, recoveries: Sequence[Recovery]) -> list[str]:
+def _late(name: str, target: Target, recoveries: Sequence[Recovery]) -> list[str]:
     times = [one.seconds if one.seconds is not None else float("inf") for one in recoveries]
-    problems = []
+    too_late = []
     if median(times) > MEDIAN_S or max(times) > LONGEST_S:
-        problems.append(f"{name}: back after {', '.join(f'{time:.1f}' for time in times)} s")
+        too_late.append(f"{name}: back after {', '.join(f'{time:.1f}' for time in times)} s")
     late = [one.take_over_seconds for one in recoveries if (one.take_over_seconds or float("inf")) > TAKE_OVER_S]
     if target == "leader" and late:
-        problems.append(f"{name}: taken over after {', '.join(map(str, late))} s")
-    return problems
+        too_late.append(f"{name}: taken over after {', '.join(map(str, late))} s")
+    return too_late
 
 
 class _Service:
@@ -127,10 +134,10 @@ class _Service:
 
     ACTORS: Final = ("actor-0", "actor-1")
 
-    def __init__(self, folder: Path, cache: Path, port: int, learners: Sequence[str]) -> None:
+    def __init__(self, folder: Path, cache: Path, port: int, learners: Sequence[str], before_s: float) -> None:
         self._cluster = Cluster(folder, cache, f"tcp/127.0.0.1:{port}")
         self._learners = learners
-        self._before: list[float] = []
+        self._before_s, self._before = before_s, list[float]()
 
     @property
     def frames_per_second(self) -> float:
@@ -155,7 +162,7 @@ class _Service:
         name = self._calm(target)
         fault = strike(self._supervisor, name, kind, PAUSE_S)
         assert fault is not None
-        self._before += self._rate().windows(fault.began - BEFORE_S, fault.began)
+        self._before += self._rate().windows(fault.began - self._before_s, fault.began)
         pause(fault.ended - time.time())
         end = fault.began + GIVE_UP_S
         while self._seconds(fault) is None and time.time() < end:
@@ -175,7 +182,7 @@ class _Service:
         wait_until(lambda: self._supervisor.settled() and self._complete(), "all processes to be there")
         since = time.time()
         wait_until(lambda: all(self._acts(actor, since) for actor in self.ACTORS), "all actors to train")
-        pause(BEFORE_S)
+        pause(self._before_s)
         match target:
             case "actor":
                 return self.ACTORS[0]
@@ -196,7 +203,7 @@ class _Service:
 
     def _seconds(self, fault: Fault) -> float | None:
         now = time.time()
-        return self._rate().recovery(fault.began, BEFORE_S, now - fault.began)
+        return self._rate().recovery(fault.began, self._before_s, now - fault.began)
 
     def _own(self, fault: Fault) -> float | None:
         """Return when the actor itself trained again; what it had sent before its pause may be answered after it."""

@@ -20,7 +20,7 @@ def kept() -> list[str]:
 
 
 def show(name: str, figures: dict[str, Any]) -> None:
-    """Print figures as JSON; a campaign that found problems ends with status 1."""
+    """Print figures as JSON; a campaign in which something is wrong or late ends with status 1."""
     click.echo(json.dumps({"campaign": name} | figures, indent=2))
-    if figures["problems"]:
+    if figures.get("wrong") or figures.get("late"):
         sys.exit(1)

@@ -18,7 +18,7 @@ import click
 from hoz_dist.wire.inbox import MOST_WAITING
 from learner.checkpoint import load_checkpoint
 from tests.campaigns.audit import audit
-from tests.campaigns.cluster import Cluster, start
+from tests.campaigns.cluster import ROUTER, Cluster, start
 from tests.campaigns.helpers import finish, helper, pause, wait_until
 from tests.campaigns.memory import MemoryWatch, highest
 from tests.campaigns.pushers import Outcome, read_outcomes
@@ -58,25 +58,27 @@ class SlowFigures:
     """Most memory of the learner while it ran as it can, megabytes."""
     memory: float
     """Most while it was slow."""
+    router_memory: float
+    """Most memory of the router while the learner was slow, megabytes."""
     gradient_megabytes: float
-    problems: list[str] = field(default_factory=list)
+    wrong: list[str] = field(default_factory=list)
+    """What must never be; empty when all is well."""
 
     def to_json(self) -> dict[str, Any]:
         """Return the figures."""
         return asdict(self)
 
 
-def slow_learner(folder: Path, cache: Path, port: int, before_s: float, seconds: float) -> SlowFigures:
+def slow_learner(folder: Path, port: int, before_s: float, seconds: float) -> SlowFigures:
     """Push as fast as a learner can, then go on while it is ten times slower.
 
     Args:
         folder: For all files; empty or not there.
-        cache: The view cache.
         port: A free TCP port of the loopback address.
         before_s: How long it runs as it can.
         seconds: How long it is slow.
     """
-    cluster = Cluster(folder, cache, f"tcp/127.0.0.1:{port}")
+    cluster = Cluster(folder, folder / "views", f"tcp/127.0.0.1:{port}")
     files = [folder / f"pushers-{number}.jsonl" for number in range(PROCESSES)]
     with Supervisor(cluster.logs) as supervisor, MemoryWatch(supervisor) as memory:
         start(supervisor, cluster.router(), cluster.learner(LEARNER, "--max-lag", str(MOST_LAG)))
@@ -104,10 +106,11 @@ def slow_learner(folder: Path, cache: Path, port: int, before_s: float, seconds:
         most_tries=max(outcome.tries for outcome in outcomes),
         memory_before=round(highest(memory.samples[LEARNER], began, slow_since)),
         memory=round(highest(memory.samples[LEARNER], slow_since, slow_until)),
+        router_memory=round(highest(memory.samples[ROUTER], slow_since, slow_until)),
         gradient_megabytes=round(_gradient_megabytes(cluster.run), 2),
     )
-    figures.problems.extend(_problems(figures, cluster.run, outcomes))
-    figures.problems.extend(f"{life.program.name} ended by itself" for life in ended_early)
+    figures.wrong.extend(_wrong(figures, cluster.run, outcomes))
+    figures.wrong.extend(f"{life.program.name} ended by itself" for life in ended_early)
     return figures
 
 
@@ -155,23 +158,23 @@ def _gradient_megabytes(run: Path) -> float:
     return load_checkpoint(run).parameters.nbytes / 1e6
 
 
-def _problems(figures: SlowFigures, run: Path, outcomes: Sequence[Outcome]) -> list[str]:
+def _wrong(figures: SlowFigures, run: Path, outcomes: Sequence[Outcome]) -> list[str]:
     found = audit(run, [])
     accepted = Counter(
         (outcome.actor, outcome.incarnation, outcome.sequence) for outcome in outcomes if outcome.result == "accepted"
     )
-    problems = [*found.figures.problems]
+    wrong = [*found.figures.problems]
     if found.record != accepted:
         missing, extra = accepted - found.record, found.record - accepted
-        problems.append(f"accepted and not recorded: {missing.total()}; recorded and not accepted: {extra.total()}")
+        wrong.append(f"accepted and not recorded: {missing.total()}; recorded and not accepted: {extra.total()}")
     allowed = figures.memory_before + COPIES * MOST_WAITING * figures.gradient_megabytes
     if figures.memory > allowed:
-        problems.append(f"the learner's memory grew from {figures.memory_before} to {figures.memory} MB")
+        wrong.append(f"the learner's memory grew from {figures.memory_before} to {figures.memory} MB")
     if not figures.busy:
-        problems.append("nobody was told busy")
+        wrong.append("nobody was told busy")
     if figures.refused.keys() - {"epoch", "stale"}:
-        problems.append(f"valid gradients were refused: {figures.refused}")
-    return problems
+        wrong.append(f"valid gradients were refused: {figures.refused}")
+    return wrong
 
 
 @click.command()
@@ -180,7 +183,7 @@ def _problems(figures: SlowFigures, run: Path, outcomes: Sequence[Outcome]) -> l
 @click.option("--folder", type=click.Path(path_type=Path), required=True, help="For all files; a new one.")
 def main(seconds: float, port: int, folder: Path) -> None:
     """Slow a learner down and print what became of all gradients as JSON."""
-    show("SLOW LEARNER", slow_learner(folder, folder / "views", port, 15.0, seconds).to_json())
+    show("SLOW LEARNER", slow_learner(folder, port, 15.0, seconds).to_json())
 
 
 if __name__ == "__main__":

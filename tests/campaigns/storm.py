@@ -26,8 +26,6 @@ from tests.campaigns.supervisor import Life, Supervisor
 from tests.campaigns.windows import QueryFigures, Window, query_figures, read_notes, windows_without_leader
 
 LEARNERS: Final = ("learner-a", "learner-b")
-CALM_S: Final = 10.0
-"""How long training goes on after the last fault."""
 SETTLED_MEMORY_S: Final = 120.0
 MEMORY_GROWTH: Final = 1.10
 QUERY_SHARE: Final = 0.99
@@ -51,6 +49,8 @@ class Settings:
     seed: int = 0
     pause_s: float = PAUSE_S
     restart_s: float = 0.5
+    calm_s: float = 10.0
+    """How long training goes on before the first fault and after the last."""
 
 
 @dataclass(frozen=True)
@@ -86,8 +86,10 @@ class StormFigures:
     windows: list[Window]
     memory: dict[str, MemoryFigures]
     ended_by_themselves: list[str]
-    problems: list[str] = field(default_factory=list)
-    """What is not as it must be; empty when all is well."""
+    wrong: list[str] = field(default_factory=list)
+    """What must never be; empty when all is well."""
+    late: list[str] = field(default_factory=list)
+    """What takes longer, or more memory, than it may."""
 
     def to_json(self) -> dict[str, Any]:
         """Return the figures, with windows summed up."""
@@ -127,13 +129,13 @@ def storm(folder: Path, cache: Path, port: int, settings: Settings) -> StormFigu
         with helper("prober", *words, log=cluster.logs / "prober.log") as prober:
             wait_until(lambda: all(_trains(cluster, actor) for actor in actors), "gradients of all actors")
             calm = time.time()
-            pause(CALM_S)
+            pause(settings.calm_s)
             began = time.time()
             blows = plan(random.Random(settings.seed), names, settings.seconds, settings.faults)
             faults = carry_out(supervisor, blows, names, settings.pause_s)
             pause(began + settings.seconds - time.time())
             wait_until(supervisor.settled, "all processes to run")
-            pause(CALM_S)
+            pause(settings.calm_s)
             ended = time.time()
             finish(prober)
         supervisor.stop(*actors)
@@ -157,8 +159,8 @@ def storm(folder: Path, cache: Path, port: int, settings: Settings) -> StormFigu
         memory={name: _memory(samples, calm, ended) for name, samples in _by_program(memory.samples).items()},
         ended_by_themselves=_ended_by_themselves(supervisor.lives),
     )
-    figures.problems.extend(_problems(figures, supervisor, names))
-    figures.problems.extend(_standstills(found.lasting, windows, began, ended))
+    figures.wrong.extend(_wrong(figures, supervisor, names))
+    figures.late.extend([*_late(figures), *_standstills(found.lasting, windows, began, ended)])
     return figures
 
 
@@ -185,26 +187,30 @@ def _ended_by_themselves(lives: Sequence[Life]) -> list[str]:
     return [f"{life.program.name} ended with status {life.code}" for life in lives if not life.struck and life.code]
 
 
-def _problems(figures: StormFigures, supervisor: Supervisor, names: Sequence[str]) -> list[str]:
-    queries = figures.queries
-    problems = [*figures.audit.problems]
-    problems += [f"{reason} is no reason to reject" for reason in figures.rejected.keys() - ALLOWED_REASONS]
-    problems += [f"{name} printed a traceback" for name in names if "Traceback" in supervisor.said(name)]
-    problems += [
+def _wrong(figures: StormFigures, supervisor: Supervisor, names: Sequence[str]) -> list[str]:
+    wrong = [*figures.audit.problems]
+    wrong += [f"{reason} is no reason to reject" for reason in figures.rejected.keys() - ALLOWED_REASONS]
+    wrong += [f"{name} printed a traceback" for name in names if "Traceback" in supervisor.said(name)]
+    wrong += [
         f"{life.program.name} ended by itself with status {life.code}"
         for life in supervisor.lives
         if not life.struck and life.code not in _ORDERLY_CODES
     ]
-    problems += [
+    return wrong
+
+
+def _late(figures: StormFigures) -> list[str]:
+    queries = figures.queries
+    late = [
         f"memory of {name} grew from {some.first:.0f} to {some.later:.0f} MB"
         for name, some in figures.memory.items()
         if some.later and some.growth >= MEMORY_GROWTH
     ]
     if queries.share < QUERY_SHARE:
-        problems.append(f"only {queries.share:.2%} of the graph queries were answered")
+        late.append(f"only {queries.share:.2%} of the graph queries were answered")
     if queries.p99_seconds > QUERY_P99_S:
-        problems.append(f"the 99th percentile of the answers is {queries.p99_seconds:.3f} s")
-    return problems
+        late.append(f"the 99th percentile of the answers is {queries.p99_seconds:.3f} s")
+    return late
 
 
 def _standstills(lasting: Sequence[Acknowledged], windows: Sequence[Window], began: float, ended: float) -> list[str]:

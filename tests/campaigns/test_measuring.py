@@ -41,7 +41,7 @@ def write_run(run: Path, epochs: Sequence[tuple[int, Sequence[int]]], seen: Sequ
         config=RunConfig(),
         epoch=len(epochs),
         version=version,
-        frames=0,
+        frames=20 * version,
         episodes=0,
         seconds=0.0,
         parameters=vector,
