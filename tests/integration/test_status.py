@@ -120,6 +120,27 @@ def test_tokens_that_no_process_of_ours_has_are_left_out(endpoint: str, key: str
         token.undeclare()
 
 
+def test_members_are_known_again_after_the_router_was_killed(endpoint: str, tmp_path: Path) -> None:
+    ben = Member("actor", "ben", "h1", 8)
+    router = ("router", "--listen", endpoint)
+    with (
+        HozDist(*router, log=tmp_path / "first.log") as first,
+        open_client(endpoint, 20.0) as session,
+        Members(session, KEYS) as members,
+        open_client(endpoint, 20.0) as one,
+        open_client(endpoint, 20.0) as other,
+        declare_alive(one, KEYS, ANNA),
+    ):
+        token = declare_alive(other, KEYS, ben)
+        until(lambda: members.current() == (ANNA, ben), "both")
+        first.stop(signal.SIGKILL)
+        until(lambda: members.current() == (), "silence")
+        token.undeclare()  # while nobody can hear of it
+        with HozDist(*router, log=tmp_path / "second.log"):
+            until(lambda: members.current() == (ANNA,), "anna")
+            assert [departure.member for departure in members.left()] == [ben]
+
+
 @pytest.fixture
 def watching(endpoint: str, tmp_path: Path) -> Iterator[HozDist]:
     words = ("status", "--watch", "--every", "0.2", "--json", "--connect", endpoint)
