@@ -4,6 +4,7 @@ A folder holds the certificate of the authority, the process's own certificate, 
 common name is ``ROLE-NAME``. `hoz-dist keys` makes such folders; here they are only read.
 """
 
+import os
 import stat
 from collections.abc import Collection
 from dataclasses import dataclass
@@ -22,7 +23,6 @@ CERTIFICATE_FILE: Final = "certificate.pem"
 KEY_FILE: Final = "key.pem"
 ROUTER_FILE: Final = "router.json5"
 """In the folder of a router: its whole configuration, with the access control."""
-_READABLE_BY_OTHERS: Final = stat.S_IRWXG | stat.S_IRWXO
 
 
 @dataclass(frozen=True)
@@ -113,8 +113,13 @@ def load_credentials(folder: Path | str, roles: Collection[str] = ROLES) -> Cred
 
 
 def _check_private(key: Path) -> None:
-    """Check that nobody else can read a private key."""
-    if key.stat().st_mode & _READABLE_BY_OTHERS:
+    """Check that nobody else can read a private key.
+
+    Of a key that belongs to somebody else, it is the group that may let us read it: so Kubernetes mounts secrets.
+    """
+    found = key.stat()
+    others = stat.S_IRWXO | (stat.S_IRWXG if found.st_uid == os.geteuid() else 0)
+    if found.st_mode & others:
         message = f"Others can read the private key '{key}'; run: chmod 600 '{key}'."
         raise InvalidValueError(message)
 

@@ -44,6 +44,8 @@ def router_settings() -> dict[str, Any]:
         "listen/timeout_ms": 0,
         "transport/link/tx/lease": SERVICE_LEASE_MS,
         _WAIT: _ROUTER_WAIT_US,
+        # zenohd, unlike us, answers questions about itself unless told not to.
+        "adminspace/permissions": {"read": False, "write": False},
     }
 
 
