@@ -28,6 +28,12 @@ keys_option = click.option(
     metavar="FOLDER",
     help="Folder with the keys of this process, made by `hoz-dist keys`.  [default: none, for tcp/ endpoints]",
 )
+shared_memory_option = click.option(
+    "--shared-memory/--no-shared-memory",
+    default=False,
+    show_default=True,
+    help="Hand over large messages on one host through shared memory; learner, actors and router must all have it on.",
+)
 
 
 def credentials_in(keys: Path | None, roles: Collection[str]) -> "Credentials | None":
