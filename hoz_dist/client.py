@@ -19,22 +19,22 @@ from hoz_dist.graph.room_graph import RoomGraph
 from hoz_dist.graph.scene_graph import SceneGraph
 from hoz_dist.nav.categories import TARGETS, category_index, scene_index
 from hoz_dist.nav.rooms import RoomId
-from hoz_dist.wire.ask import ask
-from hoz_dist.wire.codec import PROTOCOL_VERSION, decode
+from hoz_dist.wire.ask import ask, messages_in
+from hoz_dist.wire.codec import PROTOCOL_VERSION
 from hoz_dist.wire.discovery import find_run, find_runs
 from hoz_dist.wire.endpoint import DEFAULT_ENDPOINT
+from hoz_dist.wire.epochs import of_highest_epoch
 from hoz_dist.wire.graphs import plan_of, room_graph_of, scene_graph_of
 from hoz_dist.wire.keys import Keys
 from hoz_dist.wire.messages import (
     ConfigReply,
-    Message,
     PlanReply,
     Refused,
     RoomGraphReply,
     SceneGraphReply,
     StatusReply,
 )
-from hoz_dist.wire.rejection import Reason
+from hoz_dist.wire.rejection import Reason, RejectedError
 from hoz_dist.wire.session import open_client
 from hoz_dist.wire.snapshots import SEEN_SEPARATOR
 from hoz_dist.wire.waiting import Backoff, Deadline
@@ -50,7 +50,7 @@ _ERRORS: Final[dict[str, type[HozError]]] = {
     Reason.MALFORMED: InvalidValueError,
 }
 
-M = TypeVar("M", bound=Message)
+R = TypeVar("R", ConfigReply, StatusReply, SceneGraphReply, RoomGraphReply, PlanReply)
 
 
 class HozClient(Closing):
@@ -116,7 +116,9 @@ class HozClient(Closing):
             HozError: Several runs were found, or the learner does not answer.
         """
         scene_index(scene)
-        return scene_graph_of(self._ask(self._keys_of_run().graph(scene), SceneGraphReply))
+        reply = self._ask(self._keys_of_run().graph(scene), SceneGraphReply)
+        _check_answers(scene, reply.scene)
+        return scene_graph_of(reply)
 
     def room_graph(self, room: str) -> RoomGraph:
         """Return the graph of a room, for example ``kitchen/3``.
@@ -127,7 +129,9 @@ class HozClient(Closing):
             HozError: Several runs were found, or the learner does not answer.
         """
         name = str(RoomId.parse(room))
-        return room_graph_of(self._ask(self._keys_of_run().graph(name), RoomGraphReply))
+        reply = self._ask(self._keys_of_run().graph(name), RoomGraphReply)
+        _check_answers(name, str(reply.room))
+        return room_graph_of(reply)
 
     def plan(self, scene: str, target: str, seen: Sequence[str]) -> Plan:
         """Return where to go in a scene to find a target.
@@ -158,8 +162,8 @@ class HozClient(Closing):
             self._keys = Keys(find_run(self._session, self._run, ANSWER_S).run)
         return self._keys
 
-    def _ask(self, selector: str, expected: type[M]) -> M:
-        """Ask one question.
+    def _ask(self, selector: str, expected: type[R]) -> R:
+        """Ask one question; of several learners the one of the highest epoch counts.
 
         Raises:
             HozError: The learner says that it cannot answer, or does not answer at all.
@@ -170,10 +174,12 @@ class HozClient(Closing):
             if deadline.passed:
                 raise ConnectionFailedError(self._no_answer())
             backoff.pause(deadline)
-        reply = decode(answers[0].payload, expected, Refused)
+        replies = messages_in(answers, expected, Refused)
+        reply = of_highest_epoch(replies)  # type: ignore[type-var]  # each of these kinds has an epoch
         if isinstance(reply, Refused):
             raise _ERRORS.get(reply.reason, HozError)(reply.detail)
-        return reply  # type: ignore[return-value]  # the only other kind that was expected
+        assert isinstance(reply, expected)  # noqa: S101 - there are answers, and no other kind was expected
+        return reply
 
     def _no_answer(self) -> str:
         """Say what may be wrong when nobody answers; a router that denies something says nothing."""
@@ -181,3 +187,13 @@ class HozClient(Closing):
         if self._credentials is None:
             return f"{message}."
         return f"{message}, or the key in '{self._credentials.folder}' may not allow the question."
+
+
+def _check_answers(asked: str, told: str) -> None:
+    """Check that an answer is about what was asked.
+
+    Raises:
+        RejectedError: It is not.
+    """
+    if told != asked:
+        raise RejectedError(Reason.IDENTITY, f"the learner was asked for {asked} and answered with {told}")

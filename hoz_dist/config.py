@@ -50,7 +50,7 @@ class RunConfig:
     learning_rate: float = 1e-3
     """Adam's learning rate at the start; falls linearly to 0 over the budget, if there is one."""
     gradient_norm: float = 1.0
-    """Largest norm of a gradient; a larger one is scaled down."""
+    """Largest norm of a gradient: actors scale larger ones down, and the learner refuses them."""
     max_lag: int = 32
     """Largest policy lag, versions, at which a gradient is applied."""
     minutes: float | None = None

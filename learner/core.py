@@ -35,7 +35,7 @@ from learner.events import (
     Tick,
 )
 from learner.graph_store import GraphStore
-from learner.optimizer import FlatAdam, Vector, gradient_norm, lag_weight
+from learner.optimizer import NORM_TOLERANCE, FlatAdam, Vector, gradient_norm, lag_weight
 from learner.replay import Schedule, UpdateRecord
 from learner.statistics import Statistics
 
@@ -80,7 +80,7 @@ class LearnerCore:
         self.epoch = epoch
         self.version = 0
         self.finished = False
-        self._optimizer = FlatAdam(parameters, config.learning_rate, config.gradient_norm)
+        self._optimizer = FlatAdam(parameters, config.learning_rate)
         self.graphs = GraphStore(config.zones, room_digests or {})
         self.statistics = Statistics()
         self._seen = SeenPushes()
@@ -205,6 +205,8 @@ class LearnerCore:
         Its entries are finite: a message with others cannot be made.
         """
         lag, size = self.version - push.version, self._optimizer.size
+        norm, bound = gradient_norm(push.gradient), self.config.gradient_norm
+        most_frames = self.config.batch * self.config.rollout_steps
         schedule = self._schedule
         stranger = schedule is not None and push.actor not in schedule.actors
         unknown = schedule is not None and schedule.turn(push.actor, push.sequence) == "never"
@@ -220,6 +222,9 @@ class LearnerCore:
             (lag < 0, Reason.STALE, f"computed on version {push.version}, the newest is {self.version}"),
             (lag > self.config.max_lag, Reason.STALE, f"{lag} versions behind, the bound is {self.config.max_lag}"),
             (push.gradient.size != size, Reason.SHAPE, f"{push.gradient.size} entries for {size} parameters"),
+            # Actors scale their gradients down; what exceeds the bound by more than rounding is not one of theirs.
+            (norm > bound * (1.0 + NORM_TOLERANCE), Reason.NORM, f"norm {norm:.6g}, the bound is {bound:g}"),
+            (push.frames > most_frames, Reason.RANGE, f"{push.frames} frames; a rollout has at most {most_frames}"),
             (unknown, Reason.STALE, f"sequence {push.sequence} was not applied in the recorded run"),
         )
         return next(((reason, detail) for wrong, reason, detail in checks if wrong), None)
@@ -230,7 +235,7 @@ class LearnerCore:
         self._optimizer.set_progress(self.progress(now) or 0.0)
         if self._schedule is not None:
             self._optimizer.learning_rate = self._schedule.take(push.version)
-        self._optimizer.step(push.gradient, gradient_norm(push.gradient), lag_weight(lag))
+        self._optimizer.step(push.gradient, lag_weight(lag))
         self._seen.add(sender, push.sequence)
         self.version += 1
         self.statistics.applied(push.actor, push.incarnation, push.frames, lag, now)
@@ -326,7 +331,7 @@ class LearnerCore:
                 f"{self._optimizer.size}: it was written by another version of hoz-dist."
             )
             raise InvalidValueError(message)
-        self._optimizer = FlatAdam(checkpoint.parameters, self.config.learning_rate, self.config.gradient_norm)
+        self._optimizer = FlatAdam(checkpoint.parameters, self.config.learning_rate)
         self._optimizer.load_state(checkpoint.adam)
         self.version = checkpoint.version
         self.graphs = GraphStore(self.config.zones, room_digests, checkpoint.rooms, checkpoint.graph_versions)

@@ -12,7 +12,7 @@ Vector = NDArray[np.float32]
 BETAS: Final = (0.9, 0.999)
 EPSILON: Final = 1e-8
 NORM_TOLERANCE: Final = 1e-3
-"""Actors clip their gradients themselves; a norm that exceeds the bound by this share is their rounding."""
+"""Actors clip their gradients; a norm that exceeds the bound by no more than this share is their rounding."""
 
 
 class AdamState(NamedTuple):
@@ -55,13 +55,11 @@ class FlatAdam:
     Args:
         parameters: Initial parameters, float32 [P]; copied.
         learning_rate: The learning rate at progress 0.
-        max_norm: Gradients are scaled down to this Euclidean norm before they are weighed.
     """
 
-    def __init__(self, parameters: Vector, learning_rate: float, max_norm: float) -> None:
+    def __init__(self, parameters: Vector, learning_rate: float) -> None:
         self.base_learning_rate = learning_rate
         self.learning_rate = learning_rate
-        self.max_norm = max_norm
         # The NumPy arrays and the tensors are two views of the same memory.
         self._parameters = np.array(parameters, dtype=np.float32)
         self._gradient = np.zeros_like(self._parameters)
@@ -85,16 +83,14 @@ class FlatAdam:
         """Set the learning rate to ``base * (1 - progress)``; progress is the share of the budget used."""
         self.learning_rate = self.base_learning_rate * (1.0 - min(max(progress, 0.0), 1.0))
 
-    def step(self, gradient: Vector, norm: float, weight: float = 1.0) -> None:
+    def step(self, gradient: Vector, weight: float = 1.0) -> None:
         """Apply one gradient.
 
         Args:
             gradient: [P], finite; left as it is, and may be read-only (the bytes of a message).
-            norm: Its `gradient_norm`.
             weight: Its factor, see `lag_weight`.
         """
-        bounded = self.max_norm / norm if norm > self.max_norm * (1.0 + NORM_TOLERANCE) else 1.0
-        np.multiply(gradient, np.float32(bounded * weight), out=self._gradient)
+        np.multiply(gradient, np.float32(weight), out=self._gradient)
         self._adam.param_groups[0]["lr"] = self.learning_rate
         self._adam.step()
 

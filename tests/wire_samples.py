@@ -11,7 +11,9 @@ from hoz_dist.nav.categories import TARGETS
 from hoz_dist.nav.episode import EpisodeResult
 from hoz_dist.nav.rooms import RoomId
 from hoz_dist.wire.graphs import room_graph_reply, scene_graph_reply
+from hoz_dist.wire.inbox import Inbox
 from hoz_dist.wire.keys import Keys
+from hoz_dist.wire.message import Message
 from hoz_dist.wire.messages import (
     Accepted,
     Busy,
@@ -19,7 +21,6 @@ from hoz_dist.wire.messages import (
     EpisodesPush,
     GradientPush,
     LeftProcess,
-    Message,
     ParametersHead,
     ParametersShard,
     PlanReply,
@@ -83,17 +84,17 @@ MESSAGES: tuple[Message, ...] = (
     HEAD,
     ParametersShard(HEAD, 0, np.arange(100, dtype=np.float32)),
     config_reply(),
-    scene_graph_reply(scene_graph()),
-    room_graph_reply(room_graph()),
-    PlanReply(0, 3, 2, (0, 2, 3), 0.25),
+    scene_graph_reply(scene_graph(), 1),
+    room_graph_reply(room_graph(), 1),
+    PlanReply(1, 0, 3, 2, (0, 2, 3), 0.25),
     status_reply(),
 )
 """One message of every kind."""
 
 
 @contextmanager
-def serving(endpoint: str, epoch: int = 1) -> Iterator[tuple[Server, Session]]:
+def serving(endpoint: str, epoch: int = 1, inbox: Inbox | None = None) -> Iterator[tuple[Server, Session]]:
     """A learner's session and server, with nobody who takes pushes out of its inbox."""
     snapshots = Snapshots(config_reply(epoch), status_reply, "product")
-    with open_router(endpoint) as session, Server(session, KEYS, snapshots) as server:
+    with open_router(endpoint) as session, Server(session, KEYS, snapshots, inbox=inbox) as server:
         yield server, session

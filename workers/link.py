@@ -13,22 +13,20 @@ from numpy.typing import NDArray
 
 from hoz_dist.closing import Closing
 from hoz_dist.config import RunConfig
-from hoz_dist.errors import ConnectionFailedError, HozError
+from hoz_dist.errors import ConnectionFailedError, HozError, InvalidValueError, NotFoundError
 from hoz_dist.graph.room_graph import RoomGraph
 from hoz_dist.nav.categories import TARGETS
 from hoz_dist.nav.episode import EpisodeResult
 from hoz_dist.nav.rooms import RoomId
-from hoz_dist.wire.ask import ask
-from hoz_dist.wire.codec import decode
 from hoz_dist.wire.discovery import find_run
+from hoz_dist.wire.epochs import Epochs
 from hoz_dist.wire.keys import Keys
 from hoz_dist.wire.liveliness import Member, declare_alive, host_name
+from hoz_dist.wire.message import MAX_EPISODES
 from hoz_dist.wire.messages import (
-    MAX_EPISODES,
     Accepted,
     EpisodesPush,
     GradientPush,
-    ParametersHead,
     Push,
     Refused,
     RoomGraphPush,
@@ -38,6 +36,7 @@ from hoz_dist.wire.parameters import Parameters, ParametersFollower
 from hoz_dist.wire.publishing import NewestSubscriber
 from hoz_dist.wire.push import Pusher
 from hoz_dist.wire.session import Session
+from workers.journal import Journal
 
 JOIN_S: Final = 30.0
 """How long to look for the run: its learner may be starting again."""
@@ -45,8 +44,9 @@ GRAPH_S: Final = 10.0
 """How long a scene graph may take to arrive after the learner has accepted one of its rooms, seconds."""
 GRAPH_TRIES: Final = 3
 """How often a room graph is pushed if no scene graph comes."""
-FETCH_S: Final = 10.0
-"""How long to wait for parameters before looking whether the run is still the same, seconds."""
+FETCH_S: Final = 30.0
+"""How long to wait for parameters before looking whether the run is still the same, seconds; longer than a slow link
+takes for a shard."""
 
 
 class LearnerLink(Closing):
@@ -59,6 +59,7 @@ class LearnerLink(Closing):
         actor: Name of the actor, unique among the live ones of the run.
         run: Name of the run; the only one that is found, when None.
         stop: Ends whatever waits, with `StoppedError`.
+        journal: Where acknowledged pushes are noted.
 
     Attributes:
         config: Configuration of the run.
@@ -66,11 +67,17 @@ class LearnerLink(Closing):
         epoch: Epoch of the learner at joining.
 
     Raises:
-        HozError: No run is found, or several without a name.
+        HozError: No run is found, or several without a name; or the run is of other categories or another protocol
+            version.
     """
 
-    def __init__(self, session: Session, actor: str, run: str | None, stop: threading.Event) -> None:
+    def __init__(
+        self, session: Session, actor: str, run: str | None, stop: threading.Event, journal: Journal | None = None
+    ) -> None:
         reply = find_run(session, run, JOIN_S, stop)
+        if reply.categories != TARGETS:
+            message = f"Run '{reply.run}' has other categories: run the same release of hoz-dist on both sides."
+            raise HozError(message)
         self.config = RunConfig.from_json(reply.config)
         self.run = reply.run
         self.epoch = reply.epoch
@@ -78,22 +85,25 @@ class LearnerLink(Closing):
         self._actor = actor
         self._stop = stop
         self._keys = Keys(reply.run)
-        self._stamp = (0, 0)
-        """Epoch and version of the newest parameters that were fetched."""
+        self._epochs = Epochs()
+        self._epochs.hear(reply.epoch)
         self._incarnation = secrets.randbits(48)
         self._sequences: Counter[type[Push]] = Counter()
-        self._pusher = Pusher(session, stop)
+        noted = journal.write if journal is not None else None
+        self._pusher = Pusher(session, stop, epochs=self._epochs, acknowledged=noted)
         with ExitStack() as stack:
             stack.enter_context(
                 declare_alive(session, self._keys, Member("actor", actor, host_name(), self._incarnation))
             )
-            self._parameters = stack.enter_context(ParametersFollower(session, self._keys, stop))
+            self._parameters = stack.enter_context(ParametersFollower(session, self._keys, stop, self._epochs))
             self._graphs = stack.enter_context(
                 NewestSubscriber(
                     session,
                     self._keys.graph("*"),
                     SceneGraphReply,
-                    replaces=lambda known, new: (new.version, new.rooms) != (known.version, known.rooms),
+                    key_of=lambda graph: self._keys.graph(graph.scene),
+                    # A restarted learner may have forgotten the last rooms, and count from there.
+                    replaces=lambda known, new: (new.epoch, new.version) > (known.epoch, known.version),
                 )
             )
             self._open = stack.pop_all()
@@ -114,31 +124,24 @@ class LearnerLink(Closing):
         """
         while True:
             try:
-                fetched = self._parameters.fetch(at_least, FETCH_S)
-                self._stamp = fetched.head.stamp
+                return self._parameters.fetch(at_least, FETCH_S)
             except ConnectionFailedError:
                 self.check_same_run()
-            else:
-                return fetched
 
     def check_same_run(self) -> None:
         """Look whether the learner still serves the run that this actor joined; nobody there is no failure.
 
         Raises:
-            HozError: It serves another configuration, or has begun anew.
+            HozError: It serves another configuration.
         """
         try:
-            config = RunConfig.from_json(find_run(self._session, self.run, stop=self._stop).config)
-            heads = [
-                decode(answer.payload, ParametersHead)
-                for answer in ask(self._session, self._keys.params, timeout_s=FETCH_S, stop=self._stop)
-            ]
-        except HozError:
-            return
-        what = config.differences(self.config)
-        # Within a run, parameters never go back: these are of a new run in a new folder of the same name.
-        what += [f"version {head.version} of epoch {head.epoch}" for head in heads if head.stamp < self._stamp]
-        if what:
+            config = find_run(self._session, self.run, stop=self._stop)
+        except (NotFoundError, InvalidValueError):
+            return  # none, or two of them for the moment
+        found = self._epochs.choose([config])
+        if found is None:
+            return  # a learner that was replaced, and does not know it yet
+        if what := RunConfig.from_json(found.config).differences(self.config):
             message = f"The learner of '{self.run}' has begun another run ({'; '.join(what)}); start this actor again."
             raise HozError(message)
 

@@ -35,6 +35,12 @@ CONNECT_S: Final = 5.0
 )
 @weights_option
 @cache_option
+@click.option(
+    "--journal",
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="Append a JSON line for each push that the learner acknowledged.  [default: none]",
+)
 @click.option("--live", is_flag=True, help="Render every step in PyBullet instead of looking it up; slow.")
 def actor_command(
     scenes: tuple[str, ...],
@@ -44,6 +50,7 @@ def actor_command(
     name: str | None,
     weights: Path | None,
     cache: Path | None,
+    journal: Path | None,
     *,
     live: bool,
 ) -> None:
@@ -76,11 +83,14 @@ def actor_command(
         from hoz_dist.sim.view_source import StoredViews
         from hoz_dist.sim.view_store import ViewStore, default_cache
         from workers.actor import Actor
+        from workers.journal import Journal
         from workers.link import LearnerLink
 
         # A process is one thread: actors share the cores, and one thread adds up the same way every time.
         torch.set_num_threads(1)
-        with LearnerLink(session, actor, run, stop) as link, ExitStack() as stack:
+        with ExitStack() as stack:
+            book = stack.enter_context(Journal(journal)) if journal is not None else None
+            link = stack.enter_context(LearnerLink(session, actor, run, stop, book))
             size = link.config.picture_size
             encoder = matching_encoder(link.config, weights)
             store = ViewStore(cache or default_cache(), size)

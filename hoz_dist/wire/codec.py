@@ -1,21 +1,23 @@
 """Messages to bytes and back.
 
 A message is one msgpack map: ``v`` (protocol version), ``kind``, and the fields of the message. Decoding hostile bytes
-raises `RejectedError` and nothing else, and allocates no more than a small multiple of their length.
+raises `RejectedError` and nothing else, and allocates no more than a small multiple of their length: a tensor is not
+copied, and the number of all other values is bounded by the kind of the message.
 """
 
+from collections.abc import Callable
 from typing import Final, TypeVar
 
 import msgpack
 import xxhash
 
+from hoz_dist.wire.message import Message
 from hoz_dist.wire.messages import (
     Accepted,
     Busy,
     ConfigReply,
     EpisodesPush,
     GradientPush,
-    Message,
     ParametersHead,
     ParametersShard,
     PlanReply,
@@ -25,7 +27,7 @@ from hoz_dist.wire.messages import (
     SceneGraphReply,
     StatusReply,
 )
-from hoz_dist.wire.rejection import Reason, RejectedError
+from hoz_dist.wire.rejection import OtherVersionError, Reason, RejectedError
 from hoz_dist.wire.schema import MOST_CHARACTERS, MOST_ELEMENTS
 
 PROTOCOL_VERSION: Final = 1
@@ -48,6 +50,10 @@ MESSAGES: Final[dict[str, type[Message]]] = {
     )
 }
 """Every message by its kind."""
+_VERSION_FIRST: Final = b"\xa1v"
+"""The text ``v`` as the first key of a map of up to 15 entries, whose header is one byte."""
+_LAST_FIXINT: Final = b"\x7f"
+"""Numbers up to this are one byte, their own value."""
 _SPARE: Final = 16 * 1024
 """Room for all but the tensors in the buffer that a message is packed into; it grows when that is not enough."""
 
@@ -71,21 +77,22 @@ def decode(data: bytes, *expected: type[M]) -> M:
         expected: The kinds of message that may stand here.
 
     Raises:
-        RejectedError: The bytes are not one of the expected messages, or a value is not allowed.
+        RejectedError: The bytes are not one of the expected messages, or a value is not allowed; an
+            `OtherVersionError` when they are of another protocol version.
     """
+    if data[1:3] == _VERSION_FIRST and b"" < data[3:4] <= _LAST_FIXINT:
+        _check_version(int.from_bytes(data[3:4]))  # before all else: what another version looks like is not known
     longest = max(message.MOST_BYTES for message in expected)
     if len(data) > longest:
         raise RejectedError(Reason.SIZE, f"the message has {len(data)} bytes, more than {longest}")
-    fields = _unpack_map(data)
+    fields = _unpack_map(data, max(message.MOST_VALUES for message in expected))
     version, kind = fields.pop("v", None), fields.pop("kind", None)
-    if version != PROTOCOL_VERSION or type(version) is not int:
-        detail = f"the message is of protocol version {str(version)[:20]}; this side speaks {PROTOCOL_VERSION}"
-        raise RejectedError(Reason.VERSION, detail)
+    _check_version(version)
     for message in expected:
         if kind == message.KIND:
             return message.unpack(fields, kind)  # type: ignore[return-value]  # unpack of a subclass makes that subclass
     wanted = " or ".join(message.KIND for message in expected)
-    raise RejectedError(Reason.KIND, f"the message is a {str(kind)[:40]!r}, not a {wanted}")
+    raise RejectedError(Reason.KIND, f"the message is a {kind!r:.40}, not a {wanted}")
 
 
 def checksum(data: bytes) -> bytes:
@@ -99,7 +106,31 @@ def _tensor_bytes(packed: object) -> int:
     return data.nbytes if isinstance(data, memoryview) else 0
 
 
-def _unpack_map(data: bytes) -> dict[object, object]:
+def _check_version(version: object) -> None:
+    """Refuse another protocol version by name.
+
+    Raises:
+        OtherVersionError: It is not the one that this side speaks.
+    """
+    if version != PROTOCOL_VERSION or type(version) is not int:
+        raise OtherVersionError(version, PROTOCOL_VERSION)
+
+
+def _unpack_map(data: bytes, most_values: int) -> dict[object, object]:
+    """Return the map that the bytes hold.
+
+    Raises:
+        RejectedError: They are something else, hold more than ``most_values`` values, or a key occurs twice.
+    """
+    left = most_values
+
+    def spend(values: int) -> None:
+        # A list of empty maps takes a byte for each, and sixty times as much in memory.
+        nonlocal left
+        left -= values
+        if left < 0:
+            raise RejectedError(Reason.SIZE, f"the message holds more than {most_values} values")
+
     try:
         fields = msgpack.unpackb(
             data,
@@ -108,10 +139,26 @@ def _unpack_map(data: bytes) -> dict[object, object]:
             max_map_len=MOST_ELEMENTS,
             max_bin_len=len(data),
             max_ext_len=0,
+            object_pairs_hook=lambda pairs: _map_without_repeats(pairs, spend),
+            list_hook=lambda values: _counted(values, spend),
         )
     except (ValueError, TypeError, OverflowError, RecursionError, msgpack.UnpackException) as error:
         detail = f"the {len(data)} bytes are not one msgpack map ({type(error).__name__})"
         raise RejectedError(Reason.MALFORMED, detail) from error
     if type(fields) is not dict:
         raise RejectedError(Reason.MALFORMED, f"the message is a {type(fields).__name__}, not a map")
+    return fields
+
+
+def _counted(values: list[object], spend: Callable[[int], None]) -> list[object]:
+    spend(1 + len(values))
+    return values
+
+
+def _map_without_repeats(pairs: list[tuple[object, object]], spend: Callable[[int], None]) -> dict[object, object]:
+    """Return the map with those entries; readers that disagree on which of two counts must not read two messages."""
+    spend(1 + 2 * len(pairs))
+    fields = dict(pairs)
+    if len(fields) != len(pairs):
+        raise RejectedError(Reason.FIELDS, "a map has an entry twice")
     return fields

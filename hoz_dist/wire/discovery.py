@@ -1,14 +1,11 @@
 """Finding the run to join or to ask."""
 
 import threading
-from collections import Counter
 
 from hoz_dist.errors import InvalidValueError, NotFoundError
-from hoz_dist.wire.ask import ask
-from hoz_dist.wire.codec import decode
+from hoz_dist.wire.ask import ask, messages_in
 from hoz_dist.wire.keys import ALL_CONFIGS, Keys
 from hoz_dist.wire.messages import ConfigReply
-from hoz_dist.wire.rejection import RejectedError
 from hoz_dist.wire.session import Session
 from hoz_dist.wire.waiting import Backoff, Deadline
 
@@ -19,13 +16,14 @@ FIND_S = 2.0
 def find_runs(session: Session, timeout_s: float = FIND_S, stop: threading.Event | None = None) -> list[ConfigReply]:
     """Return the configuration of every run whose learner answers now, sorted by the run's name.
 
-    Learners that speak another protocol version are left out.
+    Learners that speak another protocol version are left out. Of two learners of a run the one of the higher epoch
+    counts: the other one was replaced, and does not know it yet.
 
     Raises:
-        RejectedError: Only such learners answer.
+        RejectedError: Only learners answer that cannot be understood; an `OtherVersionError` says so.
         StoppedError: The stop event was set.
     """
-    return _configs(session, ALL_CONFIGS, timeout_s, stop)
+    return _newest(_configs(session, ALL_CONFIGS, timeout_s, stop))
 
 
 def find_run(
@@ -40,8 +38,8 @@ def find_run(
         stop: Ends the search early.
 
     Raises:
-        InvalidValueError: There are several runs and none was named, two learners serve the run, or the name cannot be
-            one.
+        InvalidValueError: There are several runs and none was named, two learners of one epoch serve the run, or the
+            name cannot be one.
         NotFoundError: No learner of the run answers.
         RejectedError: The learner that answers speaks another protocol version.
         StoppedError: The stop event was set.
@@ -58,33 +56,35 @@ def find_run(
 
 
 def _configs(session: Session, selector: str, timeout_s: float, stop: threading.Event | None) -> list[ConfigReply]:
-    """Return the answers that can be read, sorted by run; see `find_runs`."""
-    configs: list[ConfigReply] = []
-    rejected: RejectedError | None = None
-    for answer in ask(session, selector, timeout_s=timeout_s, stop=stop):
-        try:
-            configs.append(decode(answer.payload, ConfigReply))
-        except RejectedError as error:
-            rejected = error
-    if rejected is not None and not configs:
-        raise rejected
-    return sorted(configs, key=lambda config: config.run)
+    """Return the answers that can be read and are on the key of their run; see `find_runs`."""
+    answers = ask(session, selector, timeout_s=timeout_s, stop=stop)
+    keys = {answer.key for answer in answers}
+    return [config for config in messages_in(answers, ConfigReply) if Keys(config.run).config in keys]
+
+
+def _newest(found: list[ConfigReply]) -> list[ConfigReply]:
+    """Return the configuration of the highest epoch of each run, sorted by run."""
+    newest = {config.run: config for config in sorted(found, key=lambda config: (config.run, config.epoch))}
+    return list(newest.values())
 
 
 def _only(found: list[ConfigReply]) -> ConfigReply:
     """Return the only run that was found.
 
     Raises:
-        InvalidValueError: It is not the only one, or it has two learners.
+        InvalidValueError: It is not the only one, or two learners of it are in one epoch.
     """
-    learners = Counter(config.run for config in found)
-    if len(learners) > 1:
-        message = f"There are several runs: {', '.join(learners)}; choose one with --run."
+    newest, *others = _newest(found)
+    if others:
+        message = (
+            f"There are several runs: {', '.join(config.run for config in (newest, *others))}; choose one with --run."
+        )
         raise InvalidValueError(message)
-    if len(found) > 1:
-        message = f"{len(found)} learners serve a run named '{found[0].run}'; stop all but one of them."
+    learners = sum(config.epoch == newest.epoch for config in found)
+    if learners > 1:
+        message = f"{learners} learners serve a run named '{newest.run}'; stop all but one of them."
         raise InvalidValueError(message)
-    return found[0]
+    return newest
 
 
 def _not_found(session: Session, run: str | None) -> str:

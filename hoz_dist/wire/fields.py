@@ -21,9 +21,12 @@ class RoomName:
         """Return the room of that name."""
         Text(64).check(raw, where)
         try:
-            return RoomId.parse(str(raw))
+            room = RoomId.parse(str(raw))
         except UnknownNameError as error:
             raise RejectedError(Reason.NAME, f"{where}: {error}") from error
+        if str(room) != raw:
+            raise RejectedError(Reason.NAME, f"{where} is {raw!r}; the room's name is {room}")
+        return room
 
     def check(self, value: Any, where: str) -> None:
         """Judge a value; see `Spec.check`."""
@@ -63,3 +66,5 @@ class EpisodeFields:
             spec.check(field, f"{where}.{name}")
         if value.moves > value.actions:
             raise RejectedError(Reason.RANGE, f"{where} has more moves than actions")
+        if value.success and not value.said_done:
+            raise RejectedError(Reason.RANGE, f"{where} is a success without Done")

@@ -8,14 +8,14 @@ from hoz_dist.nav.rooms import RoomId
 from hoz_dist.wire.messages import PlanReply, RoomGraphReply, SceneGraphReply
 
 
-def scene_graph_reply(graph: SceneGraph) -> SceneGraphReply:
-    """Return the message for a scene graph.
+def scene_graph_reply(graph: SceneGraph, epoch: int) -> SceneGraphReply:
+    """Return the message for a scene graph that the learner of an epoch serves.
 
     Raises:
         RejectedError: It is of other rooms, categories or sizes than may travel.
     """
     rooms = tuple(map(RoomId.parse, graph.rooms))
-    return SceneGraphReply(graph.scene, graph.version, rooms, graph.categories, graph.nodes, graph.edges)
+    return SceneGraphReply(epoch, graph.scene, graph.version, rooms, graph.categories, graph.nodes, graph.edges)
 
 
 def scene_graph_of(reply: SceneGraphReply) -> SceneGraph:
@@ -28,13 +28,13 @@ def scene_graph_of(reply: SceneGraphReply) -> SceneGraph:
     return SceneGraph(reply.scene, reply.version, rooms, reply.categories, reply.nodes, reply.edges)
 
 
-def room_graph_reply(graph: RoomGraph) -> RoomGraphReply:
-    """Return the message for a room graph, whose categories are the targets.
+def room_graph_reply(graph: RoomGraph, epoch: int) -> RoomGraphReply:
+    """Return the message for a room graph that the learner of an epoch serves; its categories are the targets.
 
     Raises:
         RejectedError: It is of another room or size than may travel.
     """
-    return RoomGraphReply(RoomId.parse(graph.room), graph.digest, TARGETS, graph.nodes, graph.edges)
+    return RoomGraphReply(epoch, RoomId.parse(graph.room), graph.digest, TARGETS, graph.nodes, graph.edges)
 
 
 def room_graph_of(reply: RoomGraphReply) -> RoomGraph:
@@ -46,9 +46,9 @@ def room_graph_of(reply: RoomGraphReply) -> RoomGraph:
     return RoomGraph(str(reply.room), reply.digest, reply.nodes, reply.edges)
 
 
-def plan_reply(plan: Plan) -> PlanReply:
-    """Return the message for a plan."""
-    return PlanReply(plan.current, plan.target, plan.subgoal, plan.path, plan.probability)
+def plan_reply(plan: Plan, epoch: int) -> PlanReply:
+    """Return the message for a plan of the learner of an epoch."""
+    return PlanReply(epoch, plan.current, plan.target, plan.subgoal, plan.path, plan.probability)
 
 
 def plan_of(reply: PlanReply) -> Plan:

@@ -1,18 +1,28 @@
-"""Pushes that wait for the learner: one bounded queue."""
+"""Pushes that wait for the learner: one queue, bounded by number, bytes and age.
+
+A gradient that waits grows stale, so few wait and none for long; the others are told ``busy`` and come again.
+"""
 
 import threading
+import time
 from collections import deque
+from collections.abc import Callable
 from typing import Final
 
 import zenoh
 
-from hoz_dist.wire.messages import Push, PushReply, Refused
+from hoz_dist.closing import Closing
+from hoz_dist.wire.messages import Busy, Push, PushReply, Refused
 from hoz_dist.wire.queryable import answer
 from hoz_dist.wire.rejection import Reason
 from hoz_dist.wire.rejections import Rejections
 
-MOST_WAITING: Final = 256
-MOST_WAITING_BYTES: Final = 512 * 1024 * 1024
+MOST_WAITING: Final = 32
+"""The default of `RunConfig.max_lag`: a gradient that waits behind more than that is stale when its turn comes."""
+MOST_WAITING_BYTES: Final = 256 * 1024 * 1024
+LONGEST_WAIT_S: Final = 5.0
+"""Half of what the sender waits for its answer at first: it hears ``busy`` before it gives the learner up."""
+_LOOK_EVERY_S: Final = 0.25
 
 
 class Request:
@@ -25,14 +35,20 @@ class Request:
         message: What was pushed, checked.
         size: Length of its encoded form, bytes.
         rejections: Where a refusal is counted.
+        epoch: Epoch of the learner.
+
+    Attributes:
+        arrived: When it came, seconds of the monotonic clock.
     """
 
-    def __init__(self, query: zenoh.Query, message: Push, size: int, rejections: Rejections) -> None:
+    def __init__(self, query: zenoh.Query, message: Push, size: int, rejections: Rejections, epoch: int) -> None:
         self.message = message
         self.size = size
+        self.arrived = time.monotonic()
         self._query: zenoh.Query | None = query
         self._key = str(query.key_expr)
         self._rejections = rejections
+        self._epoch = epoch
         self._lock = threading.Lock()
 
     def answer(self, reply: PushReply) -> None:
@@ -45,18 +61,29 @@ class Request:
             self._rejections.count(Reason(reply.reason), reply.detail, self.message.actor)
         answer(query, self._key, reply)
 
+    def put_off(self) -> None:
+        """Ask the sender to come again."""
+        self.answer(Busy(self._epoch))
+
 
 class Inbox:
-    """A queue bounded by number and by bytes; full means that senders are told to wait.
+    """A bounded queue of requests; those that wait too long are put off.
 
     Args:
         most: Largest number of requests that wait.
         most_bytes: Largest number of bytes of all that wait; one request may always wait.
+        longest_wait_s: How long a request waits, seconds.
     """
 
-    def __init__(self, most: int = MOST_WAITING, most_bytes: int = MOST_WAITING_BYTES) -> None:
+    def __init__(
+        self,
+        most: int = MOST_WAITING,
+        most_bytes: int = MOST_WAITING_BYTES,
+        longest_wait_s: float = LONGEST_WAIT_S,
+    ) -> None:
         self._most = most
         self._most_bytes = most_bytes
+        self._longest_wait_s = longest_wait_s
         self._requests: deque[Request] = deque()
         self._bytes = 0
         self._filled = threading.Condition()
@@ -77,9 +104,46 @@ class Inbox:
 
     def take(self, timeout_s: float) -> Request | None:
         """Remove and return the oldest request; None when none comes in time."""
+        self.put_off_late()
         with self._filled:
             if not self._filled.wait_for(lambda: bool(self._requests), timeout_s):
                 return None
-            request = self._requests.popleft()
-            self._bytes -= request.size
-            return request
+            return self._pop()
+
+    def put_off_late(self) -> None:
+        """Put those off that have waited too long."""
+        too_old = time.monotonic() - self._longest_wait_s
+        late = []
+        with self._filled:
+            while self._requests and self._requests[0].arrived < too_old:
+                late.append(self._pop())
+        for request in late:
+            request.put_off()
+
+    def _pop(self) -> Request:
+        request = self._requests.popleft()
+        self._bytes -= request.size
+        return request
+
+
+class Reaper(Closing):
+    """A thread that puts late requests off, also while the learner's own thread is stuck.
+
+    Args:
+        put_off_late: Does so; called a few times a second.
+    """
+
+    def __init__(self, put_off_late: Callable[[], None]) -> None:
+        self._put_off_late = put_off_late
+        self._closed = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="hoz puts late pushes off", daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """Stop the thread."""
+        self._closed.set()
+        self._thread.join()
+
+    def _run(self) -> None:
+        while not self._closed.wait(_LOOK_EVERY_S):
+            self._put_off_late()

@@ -10,6 +10,8 @@ from hoz_dist.nav.rooms import RoomId
 ROOT: Final = "hoz"
 NAME_PATTERN: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
 """Run names, actor names and roles. None of Zenoh's special characters (``* $ ? # @ /``) can occur."""
+NOBODY: Final = "(unnamed)"
+"""Stands for the sender of a message whose key names none; no actor can be called so."""
 ALL_CONFIGS: Final = f"{ROOT}/*/config"
 """Selects the configuration of every run that can be reached."""
 
@@ -34,8 +36,12 @@ def check_name(what: str, name: str) -> str:
 
 
 def sender_of(key: str) -> str:
-    """Return the actor that a push on a key comes from: ``hoz/{run}/{grads, rollouts or rooms}/{actor}/...``."""
-    return key.split("/")[3]
+    """Return the actor that a push on a key comes from: ``hoz/{run}/{grads, rollouts or rooms}/{actor}/...``.
+
+    A key expression without an actor's name, such as ``hoz/**``, gives `NOBODY`.
+    """
+    parts = key.split("/")
+    return parts[3] if len(parts) > 3 and NAME_PATTERN.fullmatch(parts[3]) else NOBODY  # noqa: PLR2004 - see above
 
 
 def run_of(key: str) -> str:
@@ -70,12 +76,12 @@ class Keys:
         return f"{ROOT}/{self.run}/params"
 
     @property
-    def shards(self) -> str:
-        """All shards of the newest parameters."""
-        return f"{self.params}/*"
+    def all_params(self) -> str:
+        """The head of the newest parameters, and shards."""
+        return f"{self.params}/**"
 
     def shard(self, index: int) -> str:
-        """One shard of the newest parameters."""
+        """One shard of parameters."""
         return f"{self.params}/{index}"
 
     @property

@@ -5,49 +5,39 @@ cannot know (the number of parameters, the epoch, how old a gradient may be) is 
 """
 
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar, Final
+from itertools import pairwise
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hoz_dist.errors import InvalidValueError
-from hoz_dist.graph.checks import MAX_ZONES, check_shapes, check_values
-from hoz_dist.nav.categories import SCENES, TARGETS
+from hoz_dist.graph.checks import MAX_ZONES
 from hoz_dist.nav.episode import EpisodeResult
 from hoz_dist.nav.rooms import RoomId
-from hoz_dist.wire.fields import EpisodeFields, RoomName
-from hoz_dist.wire.keys import NAME_PATTERN
-from hoz_dist.wire.rejection import Reason, RejectedError
+from hoz_dist.wire.message import (
+    CATEGORIES,
+    DIGEST,
+    EDGES,
+    EPISODES,
+    GRAPH_BYTES,
+    MAX_EPISODES,
+    MAX_FRAMES,
+    MAX_PARAMETERS,
+    NAME,
+    NODES,
+    ROOM,
+    ROOM_DIGEST,
+    SCENE,
+    SHARD_ELEMENTS,
+    SMALL_BYTES,
+    VECTOR,
+    ZONE,
+    Message,
+    Served,
+    check_graph,
+)
+from hoz_dist.wire.rejection import LONGEST_DETAIL, Reason, RejectedError
 from hoz_dist.wire.schema import Counts, Int, JsonObject, Many, OneOf, Real, Record, Structure, Tensor, Text
-
-MAX_PARAMETERS: Final = 30_000_000
-"""Largest number of policy parameters; three times the paper's sizes, and within Zenoh's largest message."""
-MAX_EPISODES: Final = 4096
-_SMALL: Final = 64 * 1024
-_GRAPH: Final = 1024 * 1024
-
-_NAME: Final = Text(64, NAME_PATTERN)
-_DIGEST: Final = Text(64)
-_SCENE: Final = OneOf(frozenset(SCENES))
-_CATEGORIES: Final = Many(OneOf(frozenset(TARGETS)), len(TARGETS))
-_VECTOR: Final = Tensor("float32", rank=1, most=MAX_PARAMETERS)
-_NODES: Final = Tensor("float64", rank=2, most=MAX_ZONES * len(TARGETS), low=0.0, high=1.0)
-_EDGES: Final = Tensor("float64", rank=2, most=MAX_ZONES**2, low=0.0, high=1.0)
-_ZONE: Final = Int(0, MAX_ZONES - 1)
-_ROOM: Final = RoomName()
-_EPISODES: Final = Many(EpisodeFields(), MAX_EPISODES)
-
-
-class Message(Structure):
-    """Base of everything that travels.
-
-    Attributes:
-        KIND: Name on the wire.
-        MOST_BYTES: Longest encoded form that is read at all.
-    """
-
-    KIND: ClassVar[str]
-    MOST_BYTES: ClassVar[int] = _SMALL
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +50,7 @@ class Push(Message):
         sequence: Counts the pushes of this incarnation and kind, from 0.
     """
 
-    actor: Annotated[str, _NAME]
+    actor: Annotated[str, NAME]
     incarnation: Annotated[int, Int()]
     sequence: Annotated[int, Int()]
 
@@ -77,12 +67,12 @@ class GradientPush(Push):
     """
 
     KIND: ClassVar[str] = "gradient"
-    MOST_BYTES: ClassVar[int] = 4 * MAX_PARAMETERS + _SMALL
+    MOST_BYTES: ClassVar[int] = 4 * MAX_PARAMETERS + SMALL_BYTES
 
     epoch: Annotated[int, Int()]
     version: Annotated[int, Int()]
-    frames: Annotated[int, Int(1)]
-    gradient: Annotated[NDArray[np.float32], _VECTOR]
+    frames: Annotated[int, Int(1, MAX_FRAMES)]
+    gradient: Annotated[NDArray[np.float32], VECTOR]
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,13 +88,20 @@ class EpisodesPush(Push):
     """
 
     KIND: ClassVar[str] = "episodes"
-    MOST_BYTES: ClassVar[int] = 128 * MAX_EPISODES + _SMALL
+    MOST_BYTES: ClassVar[int] = 128 * MAX_EPISODES + SMALL_BYTES
+    MOST_VALUES: ClassVar[int] = 16 * MAX_EPISODES
 
-    episodes: Annotated[tuple[EpisodeResult, ...], _EPISODES]
+    episodes: Annotated[tuple[EpisodeResult, ...], EPISODES]
     policy_loss: Annotated[float, Real()] = 0.0
     value_loss: Annotated[float, Real()] = 0.0
     entropy: Annotated[float, Real()] = 0.0
     scene_loss: Annotated[float, Real()] = 0.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for episode in self.episodes:
+            if episode.room.split != "train":
+                raise RejectedError(Reason.SPLIT, f"{episode.room} is kept for validation or test")
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,17 +116,17 @@ class RoomGraphFields(Structure):
         edges: [K, K] f64 zone edges, in [0, 1].
     """
 
-    MOST_BYTES: ClassVar[int] = _GRAPH
+    MOST_BYTES: ClassVar[int] = GRAPH_BYTES
 
-    room: Annotated[RoomId, _ROOM]
-    digest: Annotated[str, _DIGEST]
-    categories: Annotated[tuple[str, ...], _CATEGORIES]
-    nodes: Annotated[NDArray[np.float64], _NODES]
-    edges: Annotated[NDArray[np.float64], _EDGES]
+    room: Annotated[RoomId, ROOM]
+    digest: Annotated[str, ROOM_DIGEST]
+    categories: Annotated[tuple[str, ...], CATEGORIES]
+    nodes: Annotated[NDArray[np.float64], NODES]
+    edges: Annotated[NDArray[np.float64], EDGES]
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        _check_graph(self.nodes, self.edges, self.categories)
+        check_graph(self.nodes, self.edges, self.categories)
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,8 +168,13 @@ class Refused(Message):
     KIND: ClassVar[str] = "refused"
 
     reason: Annotated[str, OneOf(frozenset(Reason))]
-    detail: Annotated[str, Text(2048)]
+    detail: Annotated[str, Text(LONGEST_DETAIL)]
     epoch: Annotated[int, Int()] = 0
+
+    @classmethod
+    def of(cls, error: RejectedError, epoch: int) -> "Refused":
+        """Return the refusal of a message that the learner of an epoch rejects."""
+        return cls(error.reason.value, error.detail, epoch)
 
 
 PushReply = Accepted | Busy | Refused
@@ -187,16 +189,22 @@ class ParametersHead(Message):
         version: Number of updates applied to the parameters; never falls within an epoch.
         digest: xxh3_64 of the little-endian f32 vector, 16 hexadecimal digits.
         size: P, the number of parameters.
-        shards: Number of shards that the vector is served in.
+        shards: Number of shards that the vector is served in, of `SHARD_ELEMENTS` but the last.
     """
 
     KIND: ClassVar[str] = "parameters"
 
     epoch: Annotated[int, Int()]
     version: Annotated[int, Int()]
-    digest: Annotated[str, _DIGEST]
+    digest: Annotated[str, DIGEST]
     size: Annotated[int, Int(1, MAX_PARAMETERS)]
-    shards: Annotated[int, Int(1, 1024)]
+    shards: Annotated[int, Int(1)]
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        shards = -(-self.size // SHARD_ELEMENTS)
+        if self.shards != shards:
+            raise RejectedError(Reason.RANGE, f"shards is {self.shards}; {self.size} parameters have {shards}")
 
     @property
     def stamp(self) -> tuple[int, int]:
@@ -215,11 +223,24 @@ class ParametersShard(Message):
     """
 
     KIND: ClassVar[str] = "shard"
-    MOST_BYTES: ClassVar[int] = 8 * 1024 * 1024 + _SMALL
+    MOST_BYTES: ClassVar[int] = 4 * SHARD_ELEMENTS + SMALL_BYTES
 
     head: Annotated[ParametersHead, Record(ParametersHead)]
-    shard: Annotated[int, Int(0, 1023)]
-    values: Annotated[NDArray[np.float32], Tensor("float32", rank=1, most=2 * 1024 * 1024)]
+    shard: Annotated[int, Int()]
+    values: Annotated[NDArray[np.float32], Tensor("float32", rank=1, most=SHARD_ELEMENTS)]
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.shard >= self.head.shards:
+            raise RejectedError(Reason.RANGE, f"shard is {self.shard}, and there are {self.head.shards}")
+        wanted = min(SHARD_ELEMENTS, self.head.size - self.shard * SHARD_ELEMENTS)
+        if self.values.size != wanted:
+            raise RejectedError(Reason.SHAPE, f"shard {self.shard} has {self.values.size} elements, not {wanted}")
+
+    @property
+    def epoch(self) -> int:
+        """Epoch of the learner that serves it."""
+        return self.head.epoch
 
 
 @dataclass(frozen=True, eq=False)
@@ -235,14 +256,14 @@ class ConfigReply(Message):
 
     KIND: ClassVar[str] = "config"
 
-    run: Annotated[str, _NAME]
+    run: Annotated[str, NAME]
     epoch: Annotated[int, Int()]
-    categories: Annotated[tuple[str, ...], _CATEGORIES]
+    categories: Annotated[tuple[str, ...], CATEGORIES]
     config: Annotated[dict[str, Any], JsonObject()]
 
 
 @dataclass(frozen=True, eq=False)
-class SceneGraphReply(Message):
+class SceneGraphReply(Served):
     """A scene graph.
 
     Attributes:
@@ -255,29 +276,33 @@ class SceneGraphReply(Message):
     """
 
     KIND: ClassVar[str] = "scene_graph"
-    MOST_BYTES: ClassVar[int] = _GRAPH
+    MOST_BYTES: ClassVar[int] = GRAPH_BYTES
 
-    scene: Annotated[str, _SCENE]
+    scene: Annotated[str, SCENE]
     version: Annotated[int, Int()]
-    rooms: Annotated[tuple[RoomId, ...], Many(_ROOM, 1024)]
-    categories: Annotated[tuple[str, ...], _CATEGORIES]
-    nodes: Annotated[NDArray[np.float64], _NODES]
-    edges: Annotated[NDArray[np.float64], _EDGES]
+    rooms: Annotated[tuple[RoomId, ...], Many(ROOM, 1024)]
+    categories: Annotated[tuple[str, ...], CATEGORIES]
+    nodes: Annotated[NDArray[np.float64], NODES]
+    edges: Annotated[NDArray[np.float64], EDGES]
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        _check_graph(self.nodes, self.edges, self.categories)
+        check_graph(self.nodes, self.edges, self.categories)
+        if any(room.scene != self.scene for room in self.rooms):
+            raise RejectedError(Reason.NAME, f"rooms has one that is no {self.scene}")
+        if any(first.number >= second.number for first, second in pairwise(self.rooms)):
+            raise RejectedError(Reason.RANGE, "rooms is not in ascending number")
 
 
 @dataclass(frozen=True, eq=False)
-class RoomGraphReply(RoomGraphFields, Message):
+class RoomGraphReply(RoomGraphFields, Served):
     """A room graph that the learner serves."""
 
     KIND: ClassVar[str] = "room_graph"
 
 
 @dataclass(frozen=True, eq=False)
-class PlanReply(Message):
+class PlanReply(Served):
     """A plan on a scene graph; zones are numbered from 0.
 
     Attributes:
@@ -290,11 +315,17 @@ class PlanReply(Message):
 
     KIND: ClassVar[str] = "plan"
 
-    current: Annotated[int, _ZONE]
-    target: Annotated[int, _ZONE]
-    subgoal: Annotated[int, _ZONE]
-    path: Annotated[tuple[int, ...], Many(_ZONE, MAX_ZONES)]
+    current: Annotated[int, ZONE]
+    target: Annotated[int, ZONE]
+    subgoal: Annotated[int, ZONE]
+    path: Annotated[tuple[int, ...], Many(ZONE, MAX_ZONES)]
     probability: Annotated[float, Real(0.0, 1.0)]
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        ends = self.path[:1] + self.path[-1:]
+        if ends != (self.current, self.target) or self.subgoal != self.path[:2][-1]:
+            raise RejectedError(Reason.RANGE, "path does not lead from current by subgoal to target")
 
 
 @dataclass(frozen=True, eq=False)
@@ -313,9 +344,9 @@ class ProcessStatus(Structure):
         rejected: Number of its messages that were rejected.
     """
 
-    role: Annotated[str, _NAME]
-    id: Annotated[str, _NAME]
-    host: Annotated[str, _NAME]
+    role: Annotated[str, NAME]
+    id: Annotated[str, NAME]
+    host: Annotated[str, NAME]
     incarnation: Annotated[int, Int()]
     rooms: Annotated[tuple[str, ...], Many(Text(64), 256)] = ()
     frames: Annotated[int, Int()] = 0
@@ -336,9 +367,9 @@ class LeftProcess(Structure):
         seconds: How long ago its token went, seconds.
     """
 
-    role: Annotated[str, _NAME]
-    id: Annotated[str, _NAME]
-    host: Annotated[str, _NAME]
+    role: Annotated[str, NAME]
+    id: Annotated[str, NAME]
+    host: Annotated[str, NAME]
     incarnation: Annotated[int, Int()]
     seconds: Annotated[float, Real(0.0)]
 
@@ -358,6 +389,7 @@ class StatusReply(Message):
 
     KIND: ClassVar[str] = "status"
     MOST_BYTES: ClassVar[int] = 4 * 1024 * 1024
+    MOST_VALUES: ClassVar[int] = 256 * 1024
 
     version: Annotated[int, Int()]
     epoch: Annotated[int, Int()]
@@ -365,17 +397,3 @@ class StatusReply(Message):
     left: Annotated[tuple[LeftProcess, ...], Many(Record(LeftProcess), 256)]
     rejected: Annotated[dict[str, int], Counts()]
     details: Annotated[dict[str, Any], JsonObject()]
-
-
-def _check_graph(nodes: NDArray[np.float64], edges: NDArray[np.float64], categories: tuple[str, ...]) -> None:
-    """Judge whether nodes [K, N], edges [K, K] and categories [N] belong together."""
-    if len(set(categories)) != len(categories):
-        raise RejectedError(Reason.NAME, "a category occurs twice")
-    try:
-        check_shapes(nodes, edges, len(categories))
-    except InvalidValueError as error:
-        raise RejectedError(Reason.SHAPE, str(error)) from error
-    try:
-        check_values(nodes, edges)
-    except InvalidValueError as error:
-        raise RejectedError(Reason.RANGE, str(error)) from error

@@ -23,8 +23,8 @@ from zenoh.handlers import FifoChannel
 from hoz_dist.closing import Closing
 from hoz_dist.wire.codec import decode, encode
 from hoz_dist.wire.draining import Drain
-from hoz_dist.wire.messages import Message
-from hoz_dist.wire.rejection import RejectedError
+from hoz_dist.wire.message import Message
+from hoz_dist.wire.rejection import Reason, RejectedError
 from hoz_dist.wire.rejections import Rejections
 
 M = TypeVar("M", bound=Message)
@@ -68,13 +68,20 @@ class NewestSubscriber(Closing, Generic[M]):
         session: Session to subscribe on.
         key_expr: Keys to follow.
         expected: Kind of the messages.
+        key_of: The key that a message belongs on; on any other it is rejected.
         replaces: Whether the second message takes the place of the first one, which came before it.
     """
 
     def __init__(
-        self, session: Session, key_expr: str, expected: type[M], replaces: Callable[[M, M], bool] = lambda _, __: True
+        self,
+        session: Session,
+        key_expr: str,
+        expected: type[M],
+        key_of: Callable[[M], str],
+        replaces: Callable[[M, M], bool],
     ) -> None:
         self._expected = expected
+        self._key_of = key_of
         self._replaces = replaces
         self._newest: Mapping[str, M] = {}
         self._arrived = threading.Condition()
@@ -106,6 +113,9 @@ class NewestSubscriber(Closing, Generic[M]):
         key = str(sample.key_expr)
         try:
             message = decode(sample.payload.to_bytes(), self._expected)
+            if key != self._key_of(message):
+                detail = f"a {message.KIND} of {self._key_of(message)} came on {key}"
+                raise RejectedError(Reason.IDENTITY, detail)  # noqa: TRY301 - rejected like any other
         except RejectedError as error:
             self._rejections.count(error.reason, error.detail, sender=key)
             return

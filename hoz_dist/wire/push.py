@@ -4,38 +4,42 @@ Plain publications are lost silently under load, so a push is a Zenoh query with
 answer, or ``busy`` mean: wait and send it again. The learner knows a repetition by (actor, incarnation, sequence).
 """
 
-import logging
 import threading
-from typing import Final
+from collections.abc import Callable
 
 from hoz_dist.errors import ConnectionFailedError
-from hoz_dist.wire.ask import ask
-from hoz_dist.wire.codec import checksum, decode, encode
-from hoz_dist.wire.messages import Accepted, Busy, Push, PushReply, Refused
-from hoz_dist.wire.outage import learner_outage
-from hoz_dist.wire.rejection import Reason, RejectedError
+from hoz_dist.wire.asking import Asking
+from hoz_dist.wire.codec import checksum, encode
+from hoz_dist.wire.epochs import Epochs
+from hoz_dist.wire.messages import Accepted, Busy, GradientPush, Push, Refused
+from hoz_dist.wire.rejection import Reason
 from hoz_dist.wire.session import Session
-from hoz_dist.wire.waiting import Backoff, Deadline
-
-_log = logging.getLogger(__name__)
-ATTEMPT_S: Final = 10.0
-"""How long one try waits for the learner's answer; longer than a slow learner takes for the pushes before it."""
+from hoz_dist.wire.waiting import FIRST_TRY_S, Backoff, Deadline
 
 
 class Pusher:
-    """Pushes messages to the learner.
+    """Pushes messages to the learner, one at a time: a thread that pushes waits until its push is acknowledged.
 
     Args:
         session: Client session of the actor.
         stop: Ends a push that waits.
-        attempt_s: How long one try waits for an answer, seconds.
+        attempt_s: How long the first try waits for an answer, seconds; see `Patience`.
+        epochs: What is known of the learner's epochs; what a learner of a lower one answers counts as no answer.
+        acknowledged: Told of each push that was accepted: the push, the answer, and how often it was sent.
     """
 
-    def __init__(self, session: Session, stop: threading.Event, attempt_s: float = ATTEMPT_S) -> None:
-        self._session = session
+    def __init__(
+        self,
+        session: Session,
+        stop: threading.Event,
+        attempt_s: float = FIRST_TRY_S,
+        epochs: Epochs | None = None,
+        acknowledged: Callable[[Push, Accepted, int], None] | None = None,
+    ) -> None:
         self._stop = stop
-        self._attempt_s = attempt_s
-        self._outage = learner_outage(_log)
+        self._epochs = epochs or Epochs()
+        self._asking = Asking(session, stop, self._epochs, attempt_s)
+        self._acknowledged = acknowledged
 
     def push(self, key: str, message: Push, deadline_s: float | None = None) -> Accepted | Refused:
         """Send a message until it is acknowledged.
@@ -51,31 +55,26 @@ class Pusher:
         Raises:
             StoppedError: The stop event was set.
             ConnectionFailedError: The deadline passed; the learner may have taken the message all the same.
+            OtherVersionError: The learner speaks another version of the protocol.
+            AnotherRunError: The learner has begun another run.
         """
         payload = encode(message)
         attachment = checksum(payload)
         deadline, backoff = Deadline(deadline_s), Backoff(self._stop)
+        tries = 0
+        if isinstance(message, GradientPush):
+            self._epochs.hear(message.epoch)
         while True:
-            reply = self._try(key, payload, attachment, deadline.within(self._attempt_s))
-            if isinstance(reply, Accepted | Refused):
-                return reply
+            tries += 1
+            reply = self._asking.once(key, deadline, Accepted, Busy, Refused, payload=payload, attachment=attachment)
+            match reply:
+                case Accepted():
+                    if self._acknowledged is not None:
+                        self._acknowledged(message, reply, tries)
+                    return reply
+                case Refused(reason=reason) if reason != Reason.CHECKSUM:  # damaged on the way: the same again helps
+                    return reply
             if deadline.passed:
                 message_text = f"The learner did not acknowledge a {message.KIND} within {deadline_s:g} s."
                 raise ConnectionFailedError(message_text)
             backoff.pause(deadline)
-
-    def _try(self, key: str, payload: bytes, attachment: bytes, timeout_s: float) -> PushReply | None:
-        """Send once; None when there is no answer."""
-        answers = ask(self._session, key, timeout_s=timeout_s, stop=self._stop, payload=payload, attachment=attachment)
-        if not answers:
-            self._outage.failed()
-            return None
-        self._outage.worked()
-        try:
-            reply = decode(answers[0].payload, Accepted, Busy, Refused)
-        except RejectedError as error:
-            # A learner of another version, say: sending the same again would not help.
-            return Refused(error.reason, error.detail)
-        if isinstance(reply, Refused) and reply.reason == Reason.CHECKSUM:
-            return None  # damaged on the way: this time the same again does help
-        return reply  # type: ignore[return-value]  # one of the three that were expected

@@ -11,8 +11,9 @@ from zenoh.handlers import FifoChannel
 from hoz_dist.errors import HozError, NotFoundError, UnknownNameError
 from hoz_dist.wire.codec import encode
 from hoz_dist.wire.draining import Drain
-from hoz_dist.wire.messages import Busy, Message, Refused
-from hoz_dist.wire.rejection import Reason
+from hoz_dist.wire.message import Message
+from hoz_dist.wire.messages import Busy, Refused
+from hoz_dist.wire.rejection import Reason, RejectedError, plain
 
 _CHANNEL: Final = 16
 """Queries that Zenoh holds while the thread is busy with the one before; more of them block the sender's transport."""
@@ -33,6 +34,12 @@ def answer(query: Query, key: str, message: Message) -> None:
             query.reply(key, encode(message))
 
 
+def parameters_of(query: Query) -> dict[str, str]:
+    """Return the parameters of a question, ``?name=value;name=value``, by name."""
+    named = (part.partition("=") for part in str(query.parameters).split(";"))
+    return {name: value for name, _, value in named}
+
+
 def refusal_of(error: HozError, epoch: int) -> Refused:
     """Return the refusal that makes the asking side raise the same error; see `error_of`."""
     match error:
@@ -40,18 +47,21 @@ def refusal_of(error: HozError, epoch: int) -> Refused:
             reason = Reason.NAME
         case NotFoundError():
             reason = Reason.NOT_FOUND
+        case RejectedError():
+            reason = error.reason
         case _:
             reason = Reason.MALFORMED
-    return Refused(reason.value, str(error)[:2048], epoch)
+    return Refused(reason.value, plain(str(error)), epoch)
 
 
-def declare_queryable(session: Session, key_expr: str, handle: Callable[[Query], None]) -> Drain[Query]:
+def declare_queryable(session: Session, key_expr: str, handle: Callable[[Query], None], epoch: int = 0) -> Drain[Query]:
     """Answer the queries on some keys in a thread.
 
     Args:
         session: Session to declare it on.
         key_expr: Keys that it answers for.
         handle: Answers a query, or keeps it to be answered later. Should it raise, the query is refused.
+        epoch: Epoch of the learner, for that refusal.
     """
 
     def handle_or_refuse(query: Query) -> None:
@@ -59,7 +69,8 @@ def declare_queryable(session: Session, key_expr: str, handle: Callable[[Query],
             handle(query)
         except Exception:
             with contextlib.suppress(zenoh.ZError):  # it may have been answered already
-                answer(query, "", Refused(Reason.INTERNAL.value, "the learner failed to answer; its log says why"))
+                detail = "the learner failed to answer; its log says why"
+                answer(query, "", Refused(Reason.INTERNAL.value, detail, epoch))
             raise
 
     return Drain(session.declare_queryable(key_expr, FifoChannel(_CHANNEL)), handle_or_refuse, f"answers {key_expr}")

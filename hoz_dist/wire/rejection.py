@@ -1,6 +1,8 @@
 """Why a message is not accepted."""
 
+import re
 from enum import StrEnum
+from typing import Final
 
 from hoz_dist.errors import HozError
 
@@ -48,8 +50,20 @@ class Reason(StrEnum):
     """The run is over: its budget is used up. No fault of the message's, so it is not counted."""
     NOT_FOUND = "not_found"
     """What was asked for is not there yet."""
+    GONE = "gone"
+    """The version of the parameters that was asked for is not kept any more."""
     INTERNAL = "internal"
     """The learner failed while it answered; its log says why."""
+
+
+CONTROL: Final = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028\u2029]")
+"""Characters that could make two lines of one in a log, or do worse to a terminal."""
+LONGEST_DETAIL: Final = 2048
+
+
+def plain(text: str) -> str:
+    """Return as much of a text as fits a refusal or a line of a log; whoever caused it may have chosen its words."""
+    return CONTROL.sub("?", text[:LONGEST_DETAIL])
 
 
 class RejectedError(HozError):
@@ -61,6 +75,23 @@ class RejectedError(HozError):
     """
 
     def __init__(self, reason: Reason, detail: str) -> None:
-        super().__init__(f"Message rejected ({reason}): {detail}")
         self.reason = reason
-        self.detail = detail
+        self.detail = plain(detail)
+        super().__init__(f"Message rejected ({reason}): {self.detail}")
+
+
+class OtherVersionError(RejectedError):
+    """A message of a peer that speaks another version of the protocol.
+
+    Args:
+        theirs: What the peer's message has for a version; anything, since it is not of ours.
+        ours: The version that this side speaks.
+    """
+
+    def __init__(self, theirs: object, ours: int) -> None:
+        super().__init__(Reason.VERSION, f"the message is of protocol version {theirs!r:.20}; this side speaks {ours}")
+        sentence = (
+            f"The other side speaks protocol version {theirs!r:.20}; this side speaks {ours}: "
+            "run the same release of hoz-dist on both."
+        )
+        self.args = (sentence,)

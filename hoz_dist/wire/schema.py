@@ -15,7 +15,7 @@ from typing import Annotated, Any, ClassVar, Final, Protocol, get_args, get_orig
 import numpy as np
 from numpy.typing import NDArray
 
-from hoz_dist.wire.rejection import Reason, RejectedError
+from hoz_dist.wire.rejection import CONTROL, Reason, RejectedError
 
 MAX_INT: Final = 2**63 - 1
 MOST_ELEMENTS: Final = 4096
@@ -110,7 +110,7 @@ class Bool(Scalar):
 
 @dataclasses.dataclass(frozen=True)
 class Text(Scalar):
-    """A text of at most ``longest`` characters, all of it of a pattern where one is given."""
+    """A text of one line and at most ``longest`` characters, all of it of a pattern where one is given."""
 
     longest: int = 256
     pattern: re.Pattern[str] | None = None
@@ -121,7 +121,7 @@ class Text(Scalar):
             raise _wrong_type(where, "a text", value)
         if len(value) > self.longest:
             raise RejectedError(Reason.SIZE, f"{where} has {len(value)} characters, more than {self.longest}")
-        if self.pattern is not None and not self.pattern.fullmatch(value):
+        if CONTROL.search(value) or (self.pattern is not None and not self.pattern.fullmatch(value)):
             raise RejectedError(Reason.NAME, f"{where} is not well formed: {value[:80]!r}")
 
 
@@ -169,7 +169,7 @@ class Tensor:
         fields = _map_of(raw, self.FIELDS, where)
         shape, data = fields["shape"], fields["data"]
         if fields["dtype"] != self.dtype:
-            raise RejectedError(Reason.DTYPE, f"{where} is {str(fields['dtype'])[:40]}, not {self.dtype}")
+            raise RejectedError(Reason.DTYPE, f"{where} is {fields['dtype']!r:.40}, not {self.dtype}")
         if type(shape) is not list or not all(type(side) is int and side >= 0 for side in shape):
             raise RejectedError(Reason.SHAPE, f"{where} has no valid shape")
         if type(data) is not bytes:

@@ -6,8 +6,9 @@ spot from snapshots. Whatever is wrong with a message, the thread lives on and t
 """
 
 from collections.abc import Callable, Iterable
+from typing import Final
 
-from zenoh import KeyExpr, Query, Session, ZBytes
+from zenoh import KeyExpr, Query, Session
 
 from hoz_dist.closing import Closing
 from hoz_dist.errors import HozError
@@ -15,14 +16,21 @@ from hoz_dist.graph.room_graph import RoomGraph
 from hoz_dist.graph.scene_graph import SceneGraph
 from hoz_dist.wire.codec import checksum, decode, encode
 from hoz_dist.wire.graphs import room_graph_reply, scene_graph_reply
-from hoz_dist.wire.inbox import Inbox, Request
-from hoz_dist.wire.keys import Keys, sender_of
-from hoz_dist.wire.messages import Busy, EpisodesPush, GradientPush, Message, Push, Refused, RoomGraphPush
+from hoz_dist.wire.inbox import Inbox, Reaper, Request
+from hoz_dist.wire.keys import NOBODY, Keys, sender_of
+from hoz_dist.wire.message import Message
+from hoz_dist.wire.messages import EpisodesPush, GradientPush, Push, Refused, RoomGraphPush
 from hoz_dist.wire.publishing import NewestPublisher
-from hoz_dist.wire.queryable import answer, declare_queryable, refusal_of
+from hoz_dist.wire.queryable import answer, declare_queryable, parameters_of, refusal_of
 from hoz_dist.wire.rejection import Reason, RejectedError
 from hoz_dist.wire.rejections import Rejections
 from hoz_dist.wire.snapshots import GraphReply, Snapshots
+
+_CHECKSUM_BYTES: Final = 8
+_LONGEST_QUESTION: Final = 4096
+"""Characters of a question's key and parameters; the longest that makes sense names all categories."""
+_NOT_COUNTED: Final = frozenset({Reason.NOT_FOUND})
+"""Reasons for which nobody is to blame."""
 
 
 class Server(Closing):
@@ -34,6 +42,7 @@ class Server(Closing):
         snapshots: What questions are answered from.
         rejections: Where to count rejections.
         graphs: Graphs to serve from the first question on.
+        inbox: Where pushes are to wait.
 
     Attributes:
         session: The session.
@@ -50,8 +59,9 @@ class Server(Closing):
         *,
         rejections: Rejections | None = None,
         graphs: Iterable[SceneGraph | RoomGraph] = (),
+        inbox: Inbox | None = None,
     ) -> None:
-        self.inbox = Inbox()
+        self.inbox = inbox if inbox is not None else Inbox()  # an empty one is false
         self.rejections = rejections or Rejections()
         self.snapshots = snapshots
         self.session = session
@@ -69,15 +79,16 @@ class Server(Closing):
             keys.all_graphs: self._answer_graph,
             keys.all_plans: self._answer_plan,
         }
-        self._queryables = [declare_queryable(session, key, handle) for key, handle in handlers.items()]
+        self._queryables = [declare_queryable(session, key, handle, self._epoch) for key, handle in handlers.items()]
+        self._reaper = Reaper(self.inbox.put_off_late)
 
     def put_graph(self, graph: SceneGraph | RoomGraph) -> None:
         """Serve a graph instead of the one of the same scene or room so far, and publish it."""
         if isinstance(graph, SceneGraph):
             name: str = graph.scene
-            reply: GraphReply = scene_graph_reply(graph)
+            reply: GraphReply = scene_graph_reply(graph, self._epoch)
         else:
-            name, reply = graph.room, room_graph_reply(graph)
+            name, reply = graph.room, room_graph_reply(graph, self._epoch)
         self.snapshots.graphs = {**self.snapshots.graphs, name: reply}
         if name not in self._publishers:
             self._publishers[name] = NewestPublisher(self.session, self._keys.graph(name))
@@ -85,6 +96,7 @@ class Server(Closing):
 
     def close(self) -> None:
         """Stop serving; who asks from now on gets no answer."""
+        self._reaper.close()
         for queryable in self._queryables:
             queryable.close()
         for publisher in self._publishers.values():
@@ -93,29 +105,33 @@ class Server(Closing):
     def _receive(self, query: Query, expected: type[Push]) -> None:
         """Check a push, and let it wait for the learner."""
         key = str(query.key_expr)
-        payload = query.payload.to_bytes() if query.payload is not None else b""
         try:
-            message = self._checked(key, payload, query.attachment, expected)
+            message, size = self._checked(query, key, expected)
         except RejectedError as error:
             self.rejections.count(error.reason, error.detail, sender_of(key))
-            answer(query, key, Refused(error.reason.value, error.detail[:2048], self._epoch))
+            answer(query, key, Refused.of(error, self._epoch))
             return
-        request = Request(query, message, len(payload), self.rejections)
+        request = Request(query, message, size, self.rejections, self._epoch)
         if not self.inbox.offer(request):
-            request.answer(Busy(self._epoch))
+            request.put_off()
 
-    def _checked(self, key: str, payload: bytes, attachment: ZBytes | None, expected: type[Push]) -> Push:
-        """Return the message of a push.
+    def _checked(self, query: Query, key: str, expected: type[Push]) -> tuple[Push, int]:
+        """Return the message of a push, and the length of its encoded form.
 
         Raises:
             RejectedError: It was damaged on the way, is not as it should be, or came on the key of another.
         """
-        if attachment is None or attachment.to_bytes() != checksum(payload):
-            raise RejectedError(Reason.CHECKSUM, f"the {len(payload)} bytes do not have the checksum sent along")
-        message = decode(payload, expected)
+        payload, attachment = query.payload, query.attachment
+        size = len(payload) if payload is not None else 0
+        if size > expected.MOST_BYTES:  # not even copied
+            raise RejectedError(Reason.SIZE, f"the message has {size} bytes, more than {expected.MOST_BYTES}")
+        data = payload.to_bytes() if payload is not None else b""
+        if attachment is None or len(attachment) != _CHECKSUM_BYTES or attachment.to_bytes() != checksum(data):
+            raise RejectedError(Reason.CHECKSUM, f"the {size} bytes do not have the checksum sent along")
+        message = decode(data, expected)
         if key != self._key_of(message):
             raise RejectedError(Reason.IDENTITY, f"a {message.KIND} of {message.actor} came on {key}")
-        return message
+        return message, size
 
     def _key_of(self, message: Push) -> str:
         """Return the key that a push must come on."""
@@ -144,14 +160,17 @@ class Server(Closing):
     def _answer_plan(self, query: Query) -> None:
         """Answer with a plan for the target and the seen categories that the parameters name."""
         scene = str(query.key_expr).removeprefix(self._keys.plan(""))
-        named = (part.partition("=") for part in str(query.parameters).split(";"))
-        parameters = {name: value for name, _, value in named}
-        self._answer_or_refuse(query, lambda: self.snapshots.plan(scene, parameters))
+        self._answer_or_refuse(query, lambda: self.snapshots.plan(scene, parameters_of(query)))
 
     def _answer_or_refuse(self, query: Query, make: Callable[[], Message]) -> None:
         """Answer a question, or say in one sentence what is wrong with it."""
         try:
+            if len(str(query.selector)) > _LONGEST_QUESTION:
+                refusal = f"the question is longer than {_LONGEST_QUESTION} characters"
+                raise RejectedError(Reason.SIZE, refusal)
             message = make()
         except HozError as error:
             message = refusal_of(error, self._epoch)
+            if message.reason not in _NOT_COUNTED:
+                self.rejections.count(Reason(message.reason), message.detail, NOBODY)
         answer(query, str(query.key_expr), message)

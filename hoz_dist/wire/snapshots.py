@@ -70,4 +70,4 @@ class Snapshots:
         graph = self.graph(scene)
         assert isinstance(graph, SceneGraphReply)  # noqa: S101 - a scene's name stands for a scene graph
         names = [name for name in seen.split(SEEN_SEPARATOR) if name]
-        return plan_reply(plan_for(scene_graph_of(graph), target, names, self._edge_cost))
+        return plan_reply(plan_for(scene_graph_of(graph), target, names, self._edge_cost), self.config.epoch)

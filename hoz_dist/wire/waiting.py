@@ -7,6 +7,10 @@ from typing import Final
 
 FIRST_PAUSE_S: Final = 0.05
 LONGEST_PAUSE_S: Final = 2.0
+FIRST_TRY_S: Final = 10.0
+"""How long the first try waits for an answer; longer than a slow learner takes for the pushes before it."""
+LONGER_TRIES: Final = 16
+"""How many times as long the longest try waits: over a link that loses packets a gradient may take half a minute."""
 
 
 class StoppedError(Exception):
@@ -54,3 +58,29 @@ class Backoff:
         self._longest = min(2 * self._longest, LONGEST_PAUSE_S)
         if self._stop.wait(deadline.within(length)):
             raise StoppedError
+
+
+class Patience:
+    """How long a try waits for its answer: twice as long after each that got none in time.
+
+    What a slow link has not yet carried when a try ends is carried all the same, in front of the next try. Tries that
+    are all too short would never get through.
+
+    Args:
+        first_s: Of the first try, seconds.
+
+    Attributes:
+        seconds: Of the next try.
+    """
+
+    def __init__(self, first_s: float = FIRST_TRY_S) -> None:
+        self._first_s = first_s
+        self.seconds = first_s
+
+    def timed_out(self) -> None:
+        """Note that no answer came in time."""
+        self.seconds = min(2 * self.seconds, LONGER_TRIES * self._first_s)
+
+    def answered(self, after_s: float) -> None:
+        """Note that an answer came, whatever it was, so many seconds after it was asked for."""
+        self.seconds = min(max(2 * after_s, self._first_s), LONGER_TRIES * self._first_s)

@@ -80,9 +80,10 @@ class FakeActor:
 
 
 def gradient_for(parameters: Parameters, seed: int) -> NDArray[np.float32]:
-    """A gradient that depends on what it was computed on, as a real one does."""
+    """A gradient that depends on what it was computed on, as a real one does, and is no longer than one may be."""
     noise = np.random.default_rng(seed).normal(size=parameters.vector.size)
-    return (0.1 * parameters.vector + 0.01 * noise).astype(np.float32)
+    values = 0.1 * parameters.vector + 0.01 * noise
+    return (values * (CONFIG.gradient_norm / np.linalg.norm(values))).astype(np.float32)
 
 
 def graph_of(room: str, seed: int = 0, zones: int = CONFIG.zones) -> RoomGraph:

@@ -15,7 +15,7 @@ from hoz_dist.policy.settings import Method
 from hoz_dist.sim.batch_env import BatchEnv
 from hoz_dist.sim.pose_graph import PoseGraph
 from hoz_dist.sim.room_views import RoomViews
-from learner.optimizer import FlatAdam, gradient_norm
+from learner.optimizer import FlatAdam
 from tests.unit.sim.making import open_grid
 from workers.collector import Collector
 
@@ -71,12 +71,12 @@ def train(config: RunConfig, updates: int) -> tuple[float, NDArray[np.float32]]:
         zones=config.zones,
     )
     collector.use_graph(merge_rooms("kitchen", [graph], version=1))
-    optimizer = FlatAdam(initial_parameters(config.policy, config.seed), config.learning_rate, config.gradient_norm)
+    optimizer = FlatAdam(initial_parameters(config.policy, config.seed), config.learning_rate)
     ended: list[bool] = []
     for _ in range(updates):
         collector.parameters.load(optimizer.parameters)
         update = collector.roll_out()
-        optimizer.step(update.gradient, gradient_norm(update.gradient))
+        optimizer.step(update.gradient)
         ended += [result.success for result in update.finished]
     return float(np.mean(ended[-200:])), optimizer.parameters.copy()
 

@@ -44,7 +44,7 @@ def test_a_busy_learner_is_asked_again_until_it_takes_the_push(learner: Server, 
 
 
 def test_a_refused_push_is_counted_and_not_repeated(learner: Server, client: Session) -> None:
-    with answering(learner.inbox, lambda _: Refused(Reason.STALE, "too old")) as came:
+    with answering(learner.inbox, lambda _: Refused(Reason.STALE, "too old", 1)) as came:
         reply = push_to(client, samples.gradient_push())
     assert isinstance(reply, Refused)
     assert (reply.reason, reply.detail) == ("stale", "too old")
@@ -54,7 +54,7 @@ def test_a_refused_push_is_counted_and_not_repeated(learner: Server, client: Ses
 
 
 def test_the_end_of_a_run_is_no_rejection(learner: Server, client: Session) -> None:
-    with answering(learner.inbox, lambda _: Refused(Reason.FINISHED, "the budget is used up")):
+    with answering(learner.inbox, lambda _: Refused(Reason.FINISHED, "the budget is used up", 1)):
         assert isinstance(push_to(client, samples.gradient_push()), Refused)
     assert learner.rejections.by_reason() == {}
 
@@ -116,8 +116,7 @@ def test_a_push_gives_up_at_its_deadline(learner: Server, client: Session) -> No
 
 def test_a_full_inbox_makes_the_learner_busy_at_once(endpoint: str) -> None:
     inbox = Inbox(most=2)
-    with samples.serving(endpoint) as (server, _), open_client(endpoint) as session:
-        server.inbox = inbox
+    with samples.serving(endpoint, inbox=inbox) as (server, _), open_client(endpoint) as session:
         waiting = [threading.Thread(target=raw_push, args=(session, GRADS, encoded_gradient(n))) for n in range(2)]
         for thread in waiting:
             thread.start()
@@ -133,8 +132,7 @@ def test_a_full_inbox_makes_the_learner_busy_at_once(endpoint: str) -> None:
 
 def test_an_inbox_is_bounded_by_bytes_too(endpoint: str) -> None:
     inbox = Inbox(most_bytes=1000)
-    with samples.serving(endpoint) as (server, _), open_client(endpoint) as session:
-        server.inbox = inbox
+    with samples.serving(endpoint, inbox=inbox), open_client(endpoint) as session:
         first = threading.Thread(target=raw_push, args=(session, GRADS, encoded_gradient(0, size=2000)))
         first.start()
         assert until(lambda: len(inbox) == 1), "one message may always wait, however long"

@@ -17,7 +17,7 @@ from learner.leadership import Leadership, claim, newest_epoch
 
 SIZE = 11
 ZONES = 3
-CONFIG = RunConfig(zones=ZONES, learning_rate=0.01, max_lag=4)
+CONFIG = RunConfig(zones=ZONES, learning_rate=0.01, max_lag=4, gradient_norm=10.0)
 
 Float32 = NDArray[np.float32]
 

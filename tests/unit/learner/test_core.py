@@ -29,6 +29,7 @@ from learner.replay import Schedule, UpdateRecord
 from tests.unit.learner.making import (
     CONFIG,
     SIZE,
+    Float32,
     answer,
     episodes,
     gradient,
@@ -97,6 +98,17 @@ def test_a_gradient_beyond_the_lag_bound_is_refused() -> None:
     assert isinstance(reply, Accepted)
 
 
+def of_norm(norm: float) -> Float32:
+    direction = vector(0).astype(np.float64)
+    return (direction * (norm / np.linalg.norm(direction))).astype(np.float32)
+
+
+def test_a_gradient_at_the_bound_of_its_norm_is_taken_with_its_rounding() -> None:
+    core = new_core()
+    (reply,) = push(core, gradient(0, values=of_norm(1.0001 * CONFIG.gradient_norm)))
+    assert isinstance(reply, Accepted)
+
+
 @pytest.mark.parametrize(
     ("item", "reason"),
     [
@@ -105,8 +117,11 @@ def test_a_gradient_beyond_the_lag_bound_is_refused() -> None:
         (gradient(0, epoch=3, version=1), Reason.STALE),
         (gradient(0, epoch=3, values=vector(0, SIZE + 1)), Reason.SHAPE),
         (gradient(0, epoch=3, values=vector(0, SIZE - 1)), Reason.SHAPE),
+        (gradient(0, epoch=3, values=of_norm(1.01 * CONFIG.gradient_norm)), Reason.NORM),
+        (gradient(0, epoch=3, values=np.full(SIZE, 3e38, np.float32)), Reason.NORM),
+        (gradient(0, epoch=3, frames=CONFIG.batch * CONFIG.rollout_steps + 1), Reason.RANGE),
     ],
-    ids=["last epoch", "next epoch", "future version", "too long", "too short"],
+    ids=["last epoch", "next epoch", "future version", "too long", "too short", "too large", "huge", "too many frames"],
 )
 def test_a_gradient_that_does_not_fit_is_refused_and_changes_nothing(item: GradientPush, reason: Reason) -> None:
     core = new_core(epoch=3)

@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hoz_dist.wire.codec import MESSAGES, PROTOCOL_VERSION, checksum, decode, encode
-from hoz_dist.wire.messages import Accepted, ConfigReply, EpisodesPush, GradientPush, Message, Refused, RoomGraphPush
+from hoz_dist.wire.message import Message
+from hoz_dist.wire.messages import Accepted, ConfigReply, EpisodesPush, GradientPush, Refused, RoomGraphPush
 from hoz_dist.wire.rejection import Reason, RejectedError
 from tests import wire_samples as samples
 

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from hoz_dist.wire.codec import MESSAGES, PROTOCOL_VERSION, checksum, decode, encode
-from hoz_dist.wire.messages import Accepted, GradientPush, Message, Refused
+from hoz_dist.wire.message import Message
+from hoz_dist.wire.messages import Accepted, GradientPush, Refused
 from hoz_dist.wire.rejection import Reason
 
 DOCUMENT = (Path(__file__).parents[3] / "docs" / "wire-protocol.md").read_text(encoding="utf-8")

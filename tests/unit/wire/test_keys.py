@@ -3,7 +3,7 @@ import zenoh
 
 from hoz_dist.errors import InvalidValueError
 from hoz_dist.nav.rooms import RoomId
-from hoz_dist.wire.keys import ALL_CONFIGS, Keys, check_name
+from hoz_dist.wire.keys import ALL_CONFIGS, NAME_PATTERN, NOBODY, Keys, check_name, sender_of
 
 
 def test_the_keys_are_those_of_the_protocol() -> None:
@@ -24,7 +24,8 @@ def test_wildcards_select_the_keys() -> None:
     keys = Keys("r")
     pairs = [
         (ALL_CONFIGS, keys.config),
-        (keys.shards, keys.shard(0)),
+        (keys.all_params, keys.params),
+        (keys.all_params, keys.shard(0)),
         (keys.all_grads, keys.grads("a0")),
         (keys.all_rollouts, keys.rollouts("a0")),
         (keys.all_rooms, keys.room("a0", RoomId("kitchen", 3))),
@@ -45,3 +46,16 @@ def test_names_that_would_change_the_meaning_of_a_key_are_refused(name: str) -> 
         Keys(name)
     with pytest.raises(InvalidValueError, match="The actor name"):
         check_name("actor", name)
+
+
+def test_senders_are_named_by_keys_alone() -> None:
+    keys = Keys("r")
+    room = RoomId("kitchen", 3)
+    assert [sender_of(key) for key in (keys.grads("a0"), keys.rollouts("a1"), keys.room("a2", room))] == [
+        "a0",
+        "a1",
+        "a2",
+    ]
+    for strange in ("hoz/**", "hoz/r/grads", keys.all_grads, "hoz/r/grads/a b", f"hoz/r/grads/{'a' * 65}", ""):
+        assert sender_of(strange) == NOBODY
+    assert not NAME_PATTERN.fullmatch(NOBODY), "no actor can be called so"

@@ -11,8 +11,8 @@ from tests import wire_samples as samples
 def snapshots() -> Snapshots:
     snapshots = Snapshots(samples.config_reply(), samples.status_reply, "product")
     snapshots.graphs = {
-        "kitchen": scene_graph_reply(samples.scene_graph()),
-        "kitchen/3": room_graph_reply(samples.room_graph()),
+        "kitchen": scene_graph_reply(samples.scene_graph(), 1),
+        "kitchen/3": room_graph_reply(samples.room_graph(), 1),
     }
     return snapshots
 

@@ -1,0 +1,86 @@
+"""Asking the learner until it answers: what pushes and fetches have in common."""
+
+import logging
+import threading
+import time
+from typing import TypeVar
+
+from zenoh import Session
+
+from hoz_dist.wire.ask import ask, messages_in
+from hoz_dist.wire.epochs import Epochs
+from hoz_dist.wire.message import Message
+from hoz_dist.wire.outage import learner_outage
+from hoz_dist.wire.rejection import OtherVersionError, RejectedError
+from hoz_dist.wire.waiting import FIRST_TRY_S, Deadline, Patience
+
+_log = logging.getLogger(__name__)
+M = TypeVar("M", bound=Message)
+
+
+class Asking:
+    """Sends queries to the learner, and tells what counts of the answers; says once when it is away.
+
+    Args:
+        session: Client session.
+        stop: Ends a wait.
+        epochs: What is known of the learner's epochs; what a learner of a lower one answers counts as no answer.
+        first_try_s: How long the first try waits for an answer, seconds; see `Patience`.
+    """
+
+    def __init__(
+        self, session: Session, stop: threading.Event, epochs: Epochs, first_try_s: float = FIRST_TRY_S
+    ) -> None:
+        self._session = session
+        self._stop = stop
+        self._epochs = epochs
+        self._patience = Patience(first_try_s)
+        self._outage = learner_outage(_log)
+
+    def once(
+        self,
+        selector: str,
+        deadline: Deadline,
+        *expected: type[M],
+        payload: bytes | None = None,
+        attachment: bytes | None = None,
+    ) -> M | None:
+        """Ask once; None when no answer that counts came in time.
+
+        Args:
+            selector: Key expression and parameters.
+            deadline: Ends the wait early.
+            expected: Kinds of the answer, each with an epoch.
+            payload: What to send along.
+            attachment: What to send along besides.
+
+        Raises:
+            StoppedError: The stop event was set.
+            OtherVersionError: The learner speaks another version of the protocol.
+            AnotherRunError: The learner has begun another run.
+        """
+        began = time.monotonic()
+        answers = ask(
+            self._session,
+            selector,
+            timeout_s=deadline.within(self._patience.seconds),
+            stop=self._stop,
+            payload=payload,
+            attachment=attachment,
+        )
+        if answers:
+            self._patience.answered(time.monotonic() - began)
+        elif answers.timed_out:
+            self._patience.timed_out()
+        try:
+            reply = self._epochs.choose(messages_in(answers, *expected))  # type: ignore[type-var]  # see `expected`
+        except OtherVersionError:
+            raise
+        except RejectedError as error:
+            _log.warning("the learner's answer cannot be read: %s", error)
+            reply = None
+        if reply is None:
+            self._outage.failed()
+        else:
+            self._outage.worked()
+        return reply
