@@ -28,8 +28,8 @@ def parse(words: Sequence[str]) -> None:
     context = click.Context(cli, info_name="hoz-dist")
     rest = list(words)
     while isinstance(command, click.Group):
-        if rest[0] in {"--help", "--version"}:
-            return
+        if not rest or rest[0] in {"--help", "--version"}:
+            return  # it says what there is
         name, found, rest = command.resolve_command(context, rest)
         assert found is not None
         command, context = found, click.Context(found, context, info_name=name)
@@ -50,7 +50,7 @@ def commands_in(script: str) -> Iterator[list[str]]:
                 words = None
             elif words is not None:
                 words.append(word)
-            elif word == "hoz-dist" or word.endswith("/hoz-dist"):
+            elif word == "hoz-dist" or word.endswith("bin/hoz-dist"):
                 words = []
         if words:
             yield words
