@@ -32,6 +32,7 @@ from hoz_dist.wire.rejection import Reason
 from hoz_dist.wire.rejections import Rejections
 from hoz_dist.wire.server import Server
 from hoz_dist.wire.session import Session
+from hoz_dist.wire.shared_memory import SharedMemory
 from hoz_dist.wire.snapshots import Snapshots
 from learner.checkpoint import Checkpoint
 from learner.checkpoint_writer import CheckpointWriter
@@ -81,10 +82,18 @@ class Learner:
         keys: Keys of the run.
         members: Who takes part.
         me: This process, as the others see it.
+        memory: Shared memory for parameters.
     """
 
     def __init__(
-        self, core: LearnerCore, run: LedRun, session: Session, keys: Keys, members: Members, me: Member
+        self,
+        core: LearnerCore,
+        run: LedRun,
+        session: Session,
+        keys: Keys,
+        members: Members,
+        me: Member,
+        memory: SharedMemory | None = None,
     ) -> None:
         self._core = core
         self._leadership = run.leadership
@@ -105,7 +114,7 @@ class Learner:
             self._scalars = ScalarRecorder(run.folder.tensorboard, core.statistics.frames)
             stack.callback(self._scalars.close)
             stack.callback(self._save_last)
-            self._parameters = stack.enter_context(ParametersPublisher(session, keys))
+            self._parameters = stack.enter_context(ParametersPublisher(session, keys, memory=memory))
             config = ConfigReply(self._name, core.epoch, TARGETS, core.config.to_json())
             snapshots = Snapshots(config, self.status, core.config.edge_cost)
             self._publish_parameters()

@@ -36,6 +36,7 @@ from hoz_dist.wire.parameters import Parameters, ParametersFollower
 from hoz_dist.wire.publishing import NewestSubscriber
 from hoz_dist.wire.push import Pusher
 from hoz_dist.wire.session import Session
+from hoz_dist.wire.shared_memory import SharedMemory
 from workers.journal import Journal
 
 JOIN_S: Final = 30.0
@@ -60,6 +61,7 @@ class LearnerLink(Closing):
         run: Name of the run; the only one that is found, when None.
         stop: Ends whatever waits, with `StoppedError`.
         journal: Where acknowledged pushes are noted.
+        memory: Shared memory for large pushes.
 
     Attributes:
         config: Configuration of the run.
@@ -72,7 +74,13 @@ class LearnerLink(Closing):
     """
 
     def __init__(
-        self, session: Session, actor: str, run: str | None, stop: threading.Event, journal: Journal | None = None
+        self,
+        session: Session,
+        actor: str,
+        run: str | None,
+        stop: threading.Event,
+        journal: Journal | None = None,
+        memory: SharedMemory | None = None,
     ) -> None:
         reply = find_run(session, run, JOIN_S, stop)
         if reply.categories != TARGETS:
@@ -90,7 +98,7 @@ class LearnerLink(Closing):
         self._incarnation = secrets.randbits(48)
         self._sequences: Counter[type[Push]] = Counter()
         noted = journal.write if journal is not None else None
-        self._pusher = Pusher(session, stop, epochs=self._epochs, acknowledged=noted)
+        self._pusher = Pusher(session, stop, epochs=self._epochs, acknowledged=noted, memory=memory)
         with ExitStack() as stack:
             stack.enter_context(
                 declare_alive(session, self._keys, Member("actor", actor, host_name(), self._incarnation))

@@ -8,7 +8,7 @@ from typing import Final
 
 import click
 
-from hoz_dist.cli.connecting import connect_option, credentials_in, keys_option, run_option
+from hoz_dist.cli.connecting import connect_option, credentials_in, keys_option, run_option, shared_memory_option
 from hoz_dist.cli.options import cache_option, weights_option
 from hoz_dist.nav.categories import SCENES
 
@@ -41,6 +41,7 @@ CONNECT_S: Final = 5.0
     metavar="FILE",
     help="Append a JSON line for each push that the learner acknowledged.  [default: none]",
 )
+@shared_memory_option
 @click.option("--live", is_flag=True, help="Render every step in PyBullet instead of looking it up; slow.")
 def actor_command(
     scenes: tuple[str, ...],
@@ -52,6 +53,7 @@ def actor_command(
     cache: Path | None,
     journal: Path | None,
     *,
+    shared_memory: bool,
     live: bool,
 ) -> None:
     """Explore and train in training rooms for the learner at ENDPOINT, until the run is over.
@@ -65,6 +67,7 @@ def actor_command(
 
     from hoz_dist.nav.rooms import training_rooms
     from hoz_dist.wire.session import open_client
+    from hoz_dist.wire.shared_memory import SharedMemory
     from hoz_dist.wire.waiting import StoppedError
 
     rooms = training_rooms(scenes)
@@ -74,7 +77,11 @@ def actor_command(
     stop = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop.set())
-    with suppress(StoppedError), open_client(connect, CONNECT_S, stop, credentials) as session:
+    with (
+        suppress(StoppedError),
+        SharedMemory(on=shared_memory) as memory,
+        open_client(connect, CONNECT_S, stop, credentials, shared_memory=memory.on) as session,
+    ):
         # Only now, that somebody answers: these take seconds to import.
         import torch
 
@@ -90,7 +97,7 @@ def actor_command(
         torch.set_num_threads(1)
         with ExitStack() as stack:
             book = stack.enter_context(Journal(journal)) if journal is not None else None
-            link = stack.enter_context(LearnerLink(session, actor, run, stop, book))
+            link = stack.enter_context(LearnerLink(session, actor, run, stop, book, memory))
             size = link.config.picture_size
             encoder = matching_encoder(link.config, weights)
             store = ViewStore(cache or default_cache(), size)

@@ -65,7 +65,7 @@ class Question:
         session: Session,
         selector: str,
         timeout_s: float,
-        payload: bytes | None = None,
+        payload: bytes | zenoh.ZBytes | None = None,
         attachment: bytes | None = None,
     ) -> None:
         self.answers = Answers()
@@ -112,7 +112,7 @@ def ask(
     *,
     timeout_s: float,
     stop: threading.Event | None = None,
-    payload: bytes | None = None,
+    payload: bytes | zenoh.ZBytes | None = None,
     attachment: bytes | None = None,
 ) -> Answers:
     """Send a query and return all replies that come in time, error replies included.

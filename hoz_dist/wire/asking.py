@@ -5,7 +5,7 @@ import threading
 import time
 from typing import TypeVar
 
-from zenoh import Session
+from zenoh import Session, ZBytes
 
 from hoz_dist.wire.ask import ask, messages_in
 from hoz_dist.wire.epochs import Epochs
@@ -42,7 +42,7 @@ class Asking:
         selector: str,
         deadline: Deadline,
         *expected: type[M],
-        payload: bytes | None = None,
+        payload: bytes | ZBytes | None = None,
         attachment: bytes | None = None,
     ) -> M | None:
         """Ask once; None when no answer that counts came in time.

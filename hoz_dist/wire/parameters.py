@@ -28,6 +28,7 @@ from hoz_dist.wire.publishing import NewestPublisher, NewestSubscriber
 from hoz_dist.wire.queryable import answer, declare_queryable, parameters_of
 from hoz_dist.wire.rejection import Reason, RejectedError
 from hoz_dist.wire.rejections import Rejections
+from hoz_dist.wire.shared_memory import SharedMemory
 from hoz_dist.wire.versions import Parameters, Versions
 from hoz_dist.wire.waiting import Backoff, Deadline
 
@@ -52,12 +53,19 @@ class ParametersPublisher(Closing):
         keys: Keys of the run.
         rejections: Where questions that cannot be understood are counted.
         versions: What is kept for readers.
+        memory: Shared memory for the shards; None for none.
     """
 
     def __init__(
-        self, session: Session, keys: Keys, rejections: Rejections | None = None, versions: Versions | None = None
+        self,
+        session: Session,
+        keys: Keys,
+        rejections: Rejections | None = None,
+        versions: Versions | None = None,
+        memory: SharedMemory | None = None,
     ) -> None:
         self._keys = keys
+        self._memory = memory
         self._rejections = rejections or Rejections()
         self._versions = versions or Versions()
         self._publisher = NewestPublisher(session, keys.params)
@@ -102,7 +110,7 @@ class ParametersPublisher(Closing):
                 self._rejections.count(error.reason, error.detail, NOBODY)
             answer(query, key, Refused.of(error, newest.epoch))
         else:
-            answer(query, key, reply or Busy(newest.epoch))
+            answer(query, key, reply or Busy(newest.epoch), self._memory)
 
     def _shard(self, name: str, asked: dict[str, str]) -> ParametersShard | None:
         """Return the shard that is asked for; None when one more version cannot be kept now.

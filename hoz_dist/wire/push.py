@@ -14,6 +14,7 @@ from hoz_dist.wire.epochs import Epochs
 from hoz_dist.wire.messages import Accepted, Busy, GradientPush, Push, Refused
 from hoz_dist.wire.rejection import Reason
 from hoz_dist.wire.session import Session
+from hoz_dist.wire.shared_memory import SharedMemory
 from hoz_dist.wire.waiting import FIRST_TRY_S, Backoff, Deadline
 
 
@@ -26,6 +27,7 @@ class Pusher:
         attempt_s: How long the first try waits for an answer, seconds; see `Patience`.
         epochs: What is known of the learner's epochs; what a learner of a lower one answers counts as no answer.
         acknowledged: Told of each push that was accepted: the push, the answer, and how often it was sent.
+        memory: Shared memory for large messages; None for none.
     """
 
     def __init__(
@@ -35,11 +37,13 @@ class Pusher:
         attempt_s: float = FIRST_TRY_S,
         epochs: Epochs | None = None,
         acknowledged: Callable[[Push, Accepted, int], None] | None = None,
+        memory: SharedMemory | None = None,
     ) -> None:
         self._stop = stop
         self._epochs = epochs or Epochs()
         self._asking = Asking(session, stop, self._epochs, attempt_s)
         self._acknowledged = acknowledged
+        self._memory = memory or SharedMemory(on=False)
 
     def push(self, key: str, message: Push, deadline_s: float | None = None) -> Accepted | Refused:
         """Send a message until it is acknowledged.
@@ -66,7 +70,8 @@ class Pusher:
             self._epochs.hear(message.epoch)
         while True:
             tries += 1
-            reply = self._asking.once(key, deadline, Accepted, Busy, Refused, payload=payload, attachment=attachment)
+            wrapped = self._memory.wrap(payload)  # anew for each try: a paused receiver's may have been written over
+            reply = self._asking.once(key, deadline, Accepted, Busy, Refused, payload=wrapped, attachment=attachment)
             match reply:
                 case Accepted():
                     if self._acknowledged is not None:

@@ -14,24 +14,27 @@ from hoz_dist.wire.draining import Drain
 from hoz_dist.wire.message import Message
 from hoz_dist.wire.messages import Busy, Refused
 from hoz_dist.wire.rejection import Reason, RejectedError, plain
+from hoz_dist.wire.shared_memory import SharedMemory
 
 _CHANNEL: Final = 16
 """Queries that Zenoh holds while the thread is busy with the one before; more of them block the sender's transport."""
 
 
-def answer(query: Query, key: str, message: Message) -> None:
+def answer(query: Query, key: str, message: Message, memory: SharedMemory | None = None) -> None:
     """Answer a query with one message and let go of it.
 
     Args:
         query: The query.
         key: Concrete key of what the message tells.
         message: ``busy`` and ``refused`` travel as error replies, for which the key does not matter.
+        memory: Shared memory for a large message; None for none.
     """
     with query:
+        payload = encode(message)
         if isinstance(message, Busy | Refused):
-            query.reply_err(encode(message))
+            query.reply_err(payload)
         else:
-            query.reply(key, encode(message))
+            query.reply(key, payload if memory is None else memory.wrap(payload))
 
 
 def parameters_of(query: Query) -> dict[str, str]:

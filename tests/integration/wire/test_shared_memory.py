@@ -8,15 +8,23 @@ from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
 
+import numpy as np
 import pytest
 from zenoh import Query
 from zenoh.handlers import FifoChannel
 
 from hoz_dist.wire import shared_memory
 from hoz_dist.wire.draining import Drain
+from hoz_dist.wire.messages import Accepted, GradientPush
+from hoz_dist.wire.parameters import ParametersFollower, ParametersPublisher
+from hoz_dist.wire.push import Pusher
+from hoz_dist.wire.server import Server
 from hoz_dist.wire.session import Session, open_client, open_router
 from hoz_dist.wire.shared_memory import LEAST_BYTES, SharedMemory
+from hoz_dist.wire.snapshots import Snapshots
+from tests import wire_samples as samples
 from tests.integration.commands import until
+from tests.integration.wire.pushing import GRADS, KEYS, answering
 
 pytestmark = pytest.mark.integration
 
@@ -186,3 +194,26 @@ def test_what_another_host_is_sent_goes_as_bytes(endpoint: str, memory: SharedMe
         with holder(endpoint) as (_, how, look):
             assert how == "shared"
             assert look() == "True"
+
+
+def test_gradients_and_parameters_pass_through_it(endpoint: str, memory: SharedMemory) -> None:
+    gradient, parameters = samples.gradient_push(0, size=300_000), np.arange(300_000, dtype=np.float32)
+    snapshots = Snapshots(samples.config_reply(), samples.status_reply, "product")
+    stop = threading.Event()
+    with (
+        SharedMemory(on=True, messages=8) as of_learner,
+        open_router(endpoint, shared_memory=True) as session,
+        Server(session, KEYS, snapshots) as server,
+        ParametersPublisher(session, KEYS, memory=of_learner) as publisher,
+        open_client(endpoint, shared_memory=True) as client,
+        ParametersFollower(client, KEYS, stop) as follower,
+    ):
+        head = publisher.publish(1, 5, parameters)
+        assert np.array_equal(follower.fetch((1, 5), timeout_s=20.0).vector, parameters)
+        assert (of_learner.shared, of_learner.fallbacks) == (head.shards, 0)
+        pusher = Pusher(client, stop, memory=memory)
+        with answering(server.inbox, lambda _: Accepted(1, 6)) as came:
+            assert isinstance(pusher.push(GRADS, gradient, deadline_s=20.0), Accepted)
+        assert isinstance(came[0], GradientPush)
+        assert np.array_equal(came[0].gradient, gradient.gradient)
+        assert (memory.shared, memory.fallbacks) == (1, 0)
