@@ -80,6 +80,11 @@ def _advanced(keys: tuple[str, ...]) -> tuple[str, ...]:
     return tuple(f"{key}/@adv/pub/**" for key in keys)
 
 
+def _last_samples(keys: tuple[str, ...]) -> tuple[str, ...]:
+    """Return what advanced subscribers ask: they do not say ``pub``, but leave open what stands there."""
+    return tuple(f"{key}/@adv/**" for key in keys)
+
+
 def _asks(*parts: str) -> tuple[_Allow, ...]:
     """Allow to send queries, with or without payload, and to get the answers."""
     keys = _of_run(*parts)
@@ -93,14 +98,16 @@ def _serves(*parts: str) -> tuple[_Allow, ...]:
 
 
 def _follows(*parts: str) -> tuple[_Allow, ...]:
-    """Allow to subscribe to what advanced publishers say."""
+    """Allow to subscribe to what advanced publishers say, and to ask them for their last sample."""
     keys = _of_run(*parts)
     advanced = _advanced(keys)
     return (
         _Allow(_IN, ("declare_subscriber",), keys + advanced),
+        _Allow(_IN, ("query",), _last_samples(keys)),
+        _Allow(_IN, ("declare_liveliness_subscriber",), advanced),
         _Allow(_OUT, ("put",), keys + advanced),
-        _Allow(_IN, ("query", "declare_liveliness_subscriber", "liveliness_query"), advanced),
-        _Allow(_OUT, ("reply", "liveliness_token"), advanced),
+        _Allow(_OUT, ("reply",), keys),
+        _Allow(_OUT, ("liveliness_token",), advanced),
     )
 
 
@@ -110,9 +117,11 @@ def _publishes(*parts: str) -> tuple[_Allow, ...]:
     advanced = _advanced(keys)
     return (
         _Allow(_IN, ("put",), keys + advanced),
+        _Allow(_IN, ("reply",), keys),
+        _Allow(_IN, ("declare_queryable", "liveliness_token"), advanced),
         _Allow(_OUT, ("declare_subscriber",), keys + advanced),
-        _Allow(_IN, ("declare_queryable", "reply", "liveliness_token"), advanced),
-        _Allow(_OUT, ("query", "declare_liveliness_subscriber", "liveliness_query"), advanced),
+        _Allow(_OUT, ("query",), _last_samples(keys)),
+        _Allow(_OUT, ("declare_liveliness_subscriber",), advanced),
     )
 
 
@@ -124,23 +133,18 @@ def _lives(*parts: str) -> tuple[_Allow, ...]:
 def _watches(*parts: str) -> tuple[_Allow, ...]:
     """Allow to follow liveliness tokens."""
     keys = _of_run(*parts)
-    return (
-        _Allow(_IN, ("declare_liveliness_subscriber", "liveliness_query"), keys),
-        _Allow(_OUT, ("liveliness_token",), keys),
-    )
+    return (_Allow(_IN, ("declare_liveliness_subscriber",), keys), _Allow(_OUT, ("liveliness_token",), keys))
 
 
 _QUESTIONS: Final = ("config", "status", "graphs/**", "plan/*")
-_HEADS: Final = ("params", "graphs/*", "graphs/*/*")
 _PUSHES: Final = ("grads/*", "rollouts/*", "rooms/*/*/*")
 _OF_ROLE: Final[Mapping[str, tuple[_Allow, ...]]] = {
     "router": (),
     "learner": (
         *_serves(*_QUESTIONS, "params/**", *_PUSHES),
-        *_publishes(*_HEADS),
-        *_asks(*_QUESTIONS, "params/**"),
-        *_follows(*_HEADS),
+        *_publishes("params", "graphs/*", "graphs/*/*"),
         *_watches("alive/*/*/*/*"),
+        *_asks(*_QUESTIONS),
     ),
     "actor": (*_asks(*_QUESTIONS, "params/**"), *_follows("params", "graphs/*")),
     "viewer": _asks(*_QUESTIONS),
