@@ -114,7 +114,7 @@ class Learner:
             self._scalars = ScalarRecorder(run.folder.tensorboard, core.statistics.frames)
             stack.callback(self._scalars.close)
             stack.callback(self._save_last)
-            self._parameters = stack.enter_context(ParametersPublisher(session, keys, memory=memory))
+            self._parameters = stack.enter_context(ParametersPublisher(session, keys, self._rejections, memory=memory))
             config = ConfigReply(self._name, core.epoch, TARGETS, core.config.to_json())
             snapshots = Snapshots(config, self.status, core.config.edge_cost)
             self._publish_parameters()
