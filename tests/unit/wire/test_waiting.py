@@ -3,7 +3,7 @@ import time
 
 import pytest
 
-from hoz_dist.wire.waiting import LONGEST_PAUSE_S, Backoff, Deadline, StoppedError
+from hoz_dist.wire.waiting import LONGEST_PAUSE_S, Backoff, Deadline, Patience, StoppedError
 
 
 class Recorder(threading.Event):
@@ -54,3 +54,18 @@ def test_a_deadline_limits_waits() -> None:
     assert 0.0 < Deadline(1.0).within(3.0) <= 1.0
     assert Deadline(-1.0).passed
     assert Deadline(-1.0).within(3.0) == 0.0
+
+
+def test_tries_last_longer_after_each_that_timed_out_until_an_answer_comes() -> None:
+    patience = Patience()
+    waited = []
+    for _ in range(6):
+        waited.append(patience.seconds)
+        patience.timed_out()
+    assert waited == [10.0, 20.0, 40.0, 80.0, 160.0, 160.0]
+    patience.answered(0.01)
+    assert patience.seconds == 10.0
+    patience.answered(15.0)
+    assert patience.seconds == 30.0, "what the link takes is known now"
+    patience.answered(500.0)
+    assert patience.seconds == 160.0
