@@ -37,6 +37,8 @@ class Settings:
 
     link: BadLink = field(default_factory=BadLink)
     congestion_control: str = "cubic"
+    warm_up_s: float = 45.0
+    """How long the near actor trains first: a policy that knows nothing yet makes longer episodes, and more frames."""
     measure_s: float = 60.0
     """How long frames per second are measured, with and without the far actor."""
     cut_s: float = 60.0
@@ -93,6 +95,7 @@ def network(folder: Path, cache: Path, settings: Settings) -> NetworkFigures:
             start(supervisor, cluster.router(f"tcp/0.0.0.0:{PORT}"), cluster.learner(LEARNER))
             start(supervisor, cluster.actor("near", f"tcp/{HUB_FROM_NEAR}:{PORT}"))
             wait_until(lambda: service.answers("near") > 0, "the near actor to train")
+            pause(settings.warm_up_s)
             before = service.measure(settings.measure_s)
 
             far_began = time.time()
@@ -189,7 +192,7 @@ def main(
 ) -> None:
     """Train over a bad network and print the figures as JSON."""
     link = BadLink(megabits, delay_ms, loss_percent)
-    settings = Settings(link, congestion_control, measure_seconds, cut_seconds)
+    settings = Settings(link, congestion_control, measure_s=measure_seconds, cut_s=cut_seconds)
     show("NETWORK", network(folder, folder / "views", settings).to_json())
 
 

@@ -11,7 +11,7 @@ from dataclasses import asdict, dataclass, field
 from datetime import datetime
 from pathlib import Path
 from statistics import median
-from typing import Any, Final, Literal
+from typing import Any, Final, Literal, NamedTuple
 
 import click
 
@@ -32,11 +32,25 @@ KINDS: Final[tuple[Kind, ...]] = ("kill", "pause")
 MEDIAN_S: Final = 10.0
 LONGEST_S: Final = 20.0
 TAKE_OVER_S: Final = 5.0
-BEFORE_S: Final = 10.0
-GIVE_UP_S: Final = 60.0
+IN_FLIGHT_S: Final = 0.1
+"""Answers that the fault did not reach any more."""
 RESTART_S: Final = 0.3
 LEARNERS: Final = ("learner-a", "learner-b")
 _LEADS: Final = re.compile(r"^(\S+ \S+) \w+ \S+ leads run \S+, epoch (\d+)", re.MULTILINE)
+
+
+class Times(NamedTuple):
+    """How long a campaign waits for what, seconds."""
+
+    warm_up: float
+    """Before the first fault: a policy that knows nothing yet makes longer episodes, and more frames."""
+    before: float
+    """Before each fault, to measure frames per second."""
+    give_up: float
+    """For frames per second to be back."""
+
+
+USUAL: Final = Times(warm_up=45.0, before=10.0, give_up=60.0)
 
 
 @dataclass(frozen=True)
@@ -47,8 +61,8 @@ class Recovery:
     kind: Kind
     seconds: float | None
     """Until frames per second are back; None when they did not come back."""
-    own_seconds: float | None
-    """Until the same actor's next gradient, when the target is an actor."""
+    first_seconds: float | None
+    """Until the next gradient: of the actor that was hit, else of any."""
     take_over_seconds: float | None
     """Until another learner leads, when the target has a standby; None also when none took over."""
 
@@ -69,7 +83,7 @@ class RecoveryFigures:
         for recovery in self.recoveries:
             name = f"{recovery.target} {recovery.kind}"
             figures = asdict(recovery)
-            kept = {key: figures[key] for key in ("seconds", "own_seconds", "take_over_seconds")}
+            kept = {key: figures[key] for key in ("seconds", "first_seconds", "take_over_seconds")}
             for key, value in kept.items():
                 if value is not None:
                     faults.setdefault(name, {}).setdefault(key, []).append(round(value, 1))
@@ -83,7 +97,7 @@ def recovery(
     targets: Sequence[Target],
     kinds: Sequence[Kind] = KINDS,
     repeats: int = 5,
-    before_s: float = BEFORE_S,
+    times: Times = USUAL,
 ) -> RecoveryFigures:
     """Bring about each fault so many times, one after another.
 
@@ -94,7 +108,7 @@ def recovery(
         targets: What to hit.
         kinds: What to do to it.
         repeats: How often.
-        before_s: How long before a fault frames per second are measured.
+        times: How long it waits for what.
     """
     prepare_views(cache)
     alone = [target for target in targets if target == "learner"]
@@ -106,7 +120,8 @@ def recovery(
     ):
         if not some:
             continue
-        with _Service(folder / name, cache, port, learners, before_s).running() as service:
+        with _Service(folder / name, cache, port, learners, times).running() as service:
+            service.warm_up()
             for _ in range(repeats):
                 recoveries += [service.hit(target, kind) for kind in kinds for target in some]
             rates.append(service.frames_per_second)
@@ -134,10 +149,10 @@ class _Service:
 
     ACTORS: Final = ("actor-0", "actor-1")
 
-    def __init__(self, folder: Path, cache: Path, port: int, learners: Sequence[str], before_s: float) -> None:
+    def __init__(self, folder: Path, cache: Path, port: int, learners: Sequence[str], times: Times) -> None:
         self._cluster = Cluster(folder, cache, f"tcp/127.0.0.1:{port}")
         self._learners = learners
-        self._before_s, self._before = before_s, list[float]()
+        self._times, self._before = times, list[float]()
 
     @property
     def frames_per_second(self) -> float:
@@ -152,37 +167,37 @@ class _Service:
             start(self._supervisor, cluster.router(), *(cluster.learner(name, *options) for name in self._learners))
             start(self._supervisor, *(cluster.actor(name) for name in self.ACTORS))
             with (
-                open_client(cluster.endpoint, GIVE_UP_S) as session,
+                open_client(cluster.endpoint, self._times.give_up) as session,
                 Members(session, Keys(cluster.run.name)) as self._members,
             ):
                 yield self
+
+    def warm_up(self) -> None:
+        """Wait until everybody is there and training is under way."""
+        self._calm("router")
+        pause(self._times.warm_up)
 
     def hit(self, target: Target, kind: Kind) -> Recovery:
         """Bring about one fault, and wait until all is as before."""
         name = self._calm(target)
         fault = strike(self._supervisor, name, kind, PAUSE_S)
         assert fault is not None
-        self._before += self._rate().windows(fault.began - self._before_s, fault.began)
+        self._before += self._rate().windows(fault.began - self._times.before, fault.began)
         pause(fault.ended - time.time())
-        end = fault.began + GIVE_UP_S
+        end = fault.began + self._times.give_up
         while self._seconds(fault) is None and time.time() < end:
             pause(1.0)
-        if target == "actor":
-            wait_until(lambda: self._own(fault) is not None, f"{name} to come back")
-        return Recovery(
-            target,
-            kind,
-            self._seconds(fault),
-            self._own(fault) if target == "actor" else None,
-            self._taken_over(fault) if target == "leader" else None,
-        )
+        hit = [fault.name] if target == "actor" else self.ACTORS
+        wait_until(lambda: self._first(fault, hit) is not None, "training to go on")
+        take_over = self._taken_over(fault) if target == "leader" else None
+        return Recovery(target, kind, self._seconds(fault), self._first(fault, hit), take_over)
 
     def _calm(self, target: Target) -> str:
         """Wait until all has been well for a while; returns the name of the program to hit."""
         wait_until(lambda: self._supervisor.settled() and self._complete(), "all processes to be there")
         since = time.time()
         wait_until(lambda: all(self._acts(actor, since) for actor in self.ACTORS), "all actors to train")
-        pause(self._before_s)
+        pause(self._times.before)
         match target:
             case "actor":
                 return self.ACTORS[0]
@@ -203,13 +218,13 @@ class _Service:
 
     def _seconds(self, fault: Fault) -> float | None:
         now = time.time()
-        return self._rate().recovery(fault.began, self._before_s, now - fault.began)
+        return self._rate().recovery(fault.began, self._times.before, now - fault.began)
 
-    def _own(self, fault: Fault) -> float | None:
-        """Return when the actor itself trained again; what it had sent before its pause may be answered after it."""
-        since = max(fault.began, fault.ended)
-        first = first_of(self._cluster.acknowledged(fault.name), fault.name, since)
-        return None if first is None else first + since - fault.began
+    def _first(self, fault: Fault, actors: Sequence[str]) -> float | None:
+        """Return when one of some actors trained again; what it sent before its pause may be answered after it."""
+        since = fault.ended if fault.name in actors else fault.began + IN_FLIGHT_S
+        times = [first_of(self._cluster.acknowledged(actor), actor, since) for actor in actors]
+        return min((time + since - fault.began for time in times if time is not None), default=None)
 
     def _taken_over(self, fault: Fault) -> float | None:
         log = (self._cluster.run / "learner.log").read_text(encoding="utf-8")

@@ -49,7 +49,7 @@ class Settings:
     seed: int = 0
     pause_s: float = PAUSE_S
     restart_s: float = 0.5
-    calm_s: float = 10.0
+    calm_s: float = 20.0
     """How long training goes on before the first fault and after the last."""
 
 

@@ -5,14 +5,15 @@ from pathlib import Path
 import pytest
 
 from tests.campaigns import report
-from tests.campaigns.recovery import TARGETS, recovery
+from tests.campaigns.recovery import TARGETS, Times, recovery
 
 pytestmark = pytest.mark.integration
 
 
 def test_a_standby_takes_over(free_port: int, tmp_path: Path, cache: Path) -> None:
-    figures = recovery(tmp_path / "recovery", cache, free_port, ["leader"], ["kill"], repeats=1, before_s=3.0)
-    assert figures.recoveries[0].seconds is not None
+    times = Times(warm_up=0.0, before=1.0, give_up=5.0)
+    figures = recovery(tmp_path / "recovery", cache, free_port, ["leader"], ["kill"], 1, times)
+    assert figures.recoveries[0].first_seconds is not None
     assert figures.recoveries[0].take_over_seconds is not None
 
 
