@@ -97,22 +97,21 @@ def claim(run: Path, after: int) -> "Leadership | None":
     try:
         prepared.rename(_folder(run, epoch))
         flush_to_disk(epochs)
-        leadership.replace(run / EPOCH_FILE, lambda temporary: temporary.write_text(f"{epoch}\n", encoding="utf-8"))
         for older in range(1, epoch):
             _fence(_folder(run, older))
-        # Stopped in the midst of it, this process may wake up long after others have led.
-        if newest_epoch(run) == epoch:
-            return leadership
+        # Only now, that no older claimer can: it may have been stopped at this very line and wake up late.
+        leadership.replace(run / EPOCH_FILE, lambda temporary: temporary.write_text(f"{epoch}\n", encoding="utf-8"))
     except DeposedError:
-        pass
+        leadership.close()
+        return None
     except OSError as error:
-        if error.errno not in _TAKEN:
-            leadership.close()
-            raise
+        leadership.close()
+        if error.errno in _TAKEN:
+            return None
+        raise
     finally:
         shutil.rmtree(prepared, ignore_errors=True)
-    leadership.close()
-    return None
+    return leadership
 
 
 class Leadership(Closing):
@@ -135,13 +134,15 @@ class Leadership(Closing):
 
     @property
     def deposed(self) -> bool:
-        """Whether another learner has claimed a newer epoch; reads one small file."""
+        """Whether another learner has claimed a newer epoch; looks for a folder and reads one small file."""
+        # The claimer may have been killed before it wrote the file. But looking for a folder is answered from memory on
+        # a shared file system, whereas opening a file asks the server.
+        if self._fenced:
+            return True
         try:
-            # Opening a file by name asks the server on a shared file system, where looking for a name may not.
-            newest = int((self._run / EPOCH_FILE).read_text(encoding="utf-8"))
+            return int((self._run / EPOCH_FILE).read_text(encoding="utf-8")) != self.epoch
         except (OSError, ValueError):
-            return self._fenced
-        return newest != self.epoch
+            return False
 
     def replace(self, path: Path, write: Callable[[Path], object]) -> None:
         """Make or replace a file of the run, as `replace_file` does.

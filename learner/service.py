@@ -18,10 +18,11 @@ from hoz_dist.wire.liveliness import Member, Members, declare_alive, host_name
 from hoz_dist.wire.session import Session, is_connected, open_client, open_router
 from hoz_dist.wire.settings import SERVICE_LEASE_MS
 from hoz_dist.wire.waiting import StoppedError
+from learner.checkpoint import Checkpoint
 from learner.core import LearnerCore
 from learner.leadership import DeposedError, Leadership
 from learner.log_file import logged_to
-from learner.replay import Schedule, UpdateRecord, read_updates
+from learner.replay import Schedule, read_updates
 from learner.run_folder import RunFolder
 from learner.serving import Learner
 from learner.standby import ReadAhead, follow
@@ -70,16 +71,40 @@ def serve(settings: LearnerSettings, stop: threading.Event) -> None:
             or has taken it over.
     """
     keys = Keys(settings.run.resolve().name)
-    records = read_updates(settings.replay) if settings.replay is not None else None
     folder = RunFolder(settings.run, settings.config)
     folder.check()
+    cores = _Cores(settings)
     with suppress(StoppedError), _opened(settings, stop) as session:
         folder.make()
-        with Members(session, keys) as members:
-            turns = _Turns(settings, folder, session, keys, members, records)
-            leadership = None if settings.standby else folder.claim_or_refuse()
-            with leadership or nullcontext(), logged_to(folder.log, settings.name):
-                turns.take(leadership, stop)
+        leadership = None if settings.standby else folder.claim_or_refuse()
+        with leadership or nullcontext(), logged_to(folder.log, settings.name), Members(session, keys) as members:
+            _Turns(settings, folder, session, keys, members, cores).take(leadership, stop)
+
+
+class _Cores:
+    """Makes the core of an epoch, without delay."""
+
+    def __init__(self, settings: LearnerSettings) -> None:
+        self._settings = settings
+        self._records = read_updates(settings.replay) if settings.replay is not None else None
+        self._initial = initial_parameters(settings.config.policy, settings.config.seed)
+        self._room_digests = catalogue_digests()
+        # For nothing but to have it done: with the first optimizer torch imports seconds' worth of modules, for which
+        # nobody shall wait who waits for a leader.
+        self.make(0, None)
+
+    def make(self, epoch: int, checkpoint: Checkpoint | None) -> LearnerCore:
+        """Return the core of an epoch that goes on from a checkpoint, or begins the run."""
+        applied = checkpoint.version if checkpoint is not None else 0
+        return LearnerCore(
+            self._settings.config,
+            self._initial,
+            epoch=epoch,
+            checkpoint=checkpoint,
+            room_digests=self._room_digests,
+            schedule=Schedule(self._records, applied) if self._records is not None else None,
+            checkpoint_seconds=self._settings.checkpoint_seconds,
+        )
 
 
 class _Turns:
@@ -92,18 +117,15 @@ class _Turns:
         session: Session,
         keys: Keys,
         members: Members,
-        records: list[UpdateRecord] | None,
+        cores: _Cores,
     ) -> None:
         self._settings = settings
         self._folder = folder
         self._session = session
         self._keys = keys
         self._members = members
-        self._records = records
+        self._cores = cores
         self._incarnation = secrets.randbits(48)
-        # Made beforehand, so that taking over does not wait for them.
-        self._initial = initial_parameters(settings.config.policy, settings.config.seed)
-        self._room_digests = catalogue_digests()
 
     def take(self, leadership: Leadership | None, stop: threading.Event) -> None:
         """Lead or follow until ``stop`` is set, or the run is over.
@@ -141,16 +163,7 @@ class _Turns:
                 run = self._folder.take_over(leadership, ahead.read)
             except DeposedError:
                 return True
-            applied = run.checkpoint.version if run.checkpoint is not None else 0
-            core = LearnerCore(
-                settings.config,
-                self._initial,
-                epoch=leadership.epoch,
-                checkpoint=run.checkpoint,
-                room_digests=self._room_digests,
-                schedule=Schedule(self._records, applied) if self._records is not None else None,
-                checkpoint_seconds=settings.checkpoint_seconds,
-            )
+            core = self._cores.make(leadership.epoch, run.checkpoint)
             _log.info(
                 "leads run %s, epoch %d, from version %d (%d parameters): %s",
                 *(self._keys.run, core.epoch, core.version, core.parameters.size),

@@ -20,7 +20,7 @@ from learner.run_folder import RunFolder
 
 FREE_S: Final = 0.3
 """How long the token of a leader that has let go of its lock must be away."""
-STILL_S: Final = 2.0
+STILL_S: Final = 1.5
 """How long that of a leader that holds its lock must be away, beyond the lease after which the router gave it up."""
 RECONNECTED_S: Final = 4.0
 """The same after the network of this process was away: others try to come back every 2 s."""

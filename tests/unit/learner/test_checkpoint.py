@@ -1,6 +1,7 @@
 import json
 import logging
 import pickle
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -33,6 +34,21 @@ def with_version(checkpoint: Checkpoint, version: int) -> Checkpoint:
 
 def versions(folder: Path) -> list[int]:
     return [stamp.version for path in checkpoint_files(folder) if (stamp := Stamp.of(path)) is not None]
+
+
+class Deposing:
+    """Files of a leader that is deposed right after it has saved a checkpoint."""
+
+    def __init__(self, run: Path) -> None:
+        self.run = run
+        self.leadership = leading(run)
+
+    def replace(self, path: Path, write: Callable[[Path], object]) -> None:
+        self.leadership.replace(path, write)
+        leading(self.run).close()
+
+    def remove(self, path: Path) -> None:
+        self.leadership.remove(path)
 
 
 def damage(path: Path) -> None:
@@ -80,6 +96,18 @@ def test_of_a_finished_run_that_is_opened_again_and_again_the_last_end_is_kept(
         save_checkpoint(tmp_path, replace(checkpoint, epoch=epoch, version=9), keep=True)
     assert [Stamp.of(path) for path in checkpoint_files(tmp_path)] == [(8, 9), (7, 9), (6, 9), (5, 9)]
     assert len(list(tmp_path.glob("*.keep"))) == 4
+
+
+def test_a_learner_that_is_deposed_before_it_deletes_what_is_too_old_does_not_delete_it(
+    tmp_path: Path, checkpoint: Checkpoint
+) -> None:
+    for version in range(1, 4):
+        save_checkpoint(tmp_path / "checkpoints", with_version(checkpoint, version))
+    files = Deposing(tmp_path)
+    with pytest.raises(DeposedError):
+        save_checkpoint(tmp_path / "checkpoints", with_version(checkpoint, 4), files=files)
+    assert versions(tmp_path / "checkpoints") == [4, 3, 2, 1]
+    files.leadership.close()
 
 
 def test_a_later_epoch_comes_after_an_earlier_one_whatever_the_versions(tmp_path: Path, checkpoint: Checkpoint) -> None:
