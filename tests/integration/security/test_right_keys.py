@@ -54,8 +54,8 @@ def test_an_actor_hears_of_parameters_before_and_after_it_came(network: Network)
         with ParametersFollower(second, KEYS, stop) as late:
             assert until(lambda: late.newest is not None)
             network.parameters.publish(1, 2, np.ones(3, np.float32))
+            assert until(lambda: [one.newest and one.newest.version for one in (early, late)] == [2, 2])
             for follower in (early, late):
-                assert until(lambda follower=follower: follower.newest.version == 2)
                 assert follower.fetch((1, 2), timeout_s=5.0).vector.sum() == 3
 
 
@@ -83,7 +83,6 @@ def test_a_learner_knows_who_is_alive(network: Network) -> None:
     ):
         token = declare_alive(first, KEYS, actor)
         with declare_alive(second, KEYS, standby):
-            for one in (members, seen_by_standby):
-                assert until(lambda one=one: one.current() == (actor, standby))
+            assert until(lambda: members.current() == seen_by_standby.current() == (actor, standby))
             token.undeclare()  # type: ignore[no-untyped-call]
             assert until(lambda: members.current() == (standby,))
