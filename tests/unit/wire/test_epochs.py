@@ -2,14 +2,15 @@ import pytest
 
 from hoz_dist.wire import epochs
 from hoz_dist.wire.epochs import AnotherRunError, Epochs, of_highest_epoch
-from hoz_dist.wire.messages import Accepted, Busy, Refused
+from hoz_dist.wire.messages import Accepted, Busy, PushReply, Refused
 
 
 def test_of_several_answers_the_one_of_the_highest_epoch_counts() -> None:
-    old, new = Accepted(1, 9), Refused("epoch", "computed in epoch 1", 2)
-    assert of_highest_epoch([old, new, Busy(1)]) is new
-    assert of_highest_epoch([]) is None
-    assert Epochs().choose([old, new]) is new
+    new = Refused("epoch", "computed in epoch 1", 2)
+    told: list[PushReply] = [Accepted(1, 9), new, Busy(1)]
+    assert of_highest_epoch(told) is new
+    assert Epochs().choose(told) is new
+    assert of_highest_epoch(told[:0]) is None
 
 
 def test_what_a_learner_of_a_lower_epoch_says_does_not_count() -> None:
