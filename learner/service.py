@@ -17,6 +17,7 @@ from hoz_dist.wire.keys import Keys
 from hoz_dist.wire.liveliness import Member, Members, declare_alive, host_name
 from hoz_dist.wire.session import Session, is_connected, open_client, open_router
 from hoz_dist.wire.settings import SERVICE_LEASE_MS
+from hoz_dist.wire.shared_memory import SharedMemory
 from hoz_dist.wire.waiting import StoppedError
 from learner.checkpoint import Checkpoint
 from learner.core import LearnerCore
@@ -34,6 +35,8 @@ CONNECT_S: Final = 30.0
 """How long a learner that is no standby tries to reach its router, seconds; it may be starting."""
 ATTEMPT_S: Final = 5.0
 """How long a standby tries before it says so, seconds; then it goes on trying."""
+SHARDS_SHARED: Final = 16
+"""Shards of parameters that fit into shared memory: each actor takes one at a time."""
 LEADER: Final = "learner"
 STANDBY: Final = "standby"
 
@@ -56,6 +59,8 @@ class LearnerSettings:
     run: Path
     """The run's folder; its last part is the run's name on the network."""
     config: RunConfig
+    shared_memory: bool = False
+    """Hand over large messages to processes of this host through shared memory."""
     checkpoint_seconds: float = 30.0
     replay: Path | None = None
     """Recorded updates to repeat."""
@@ -74,11 +79,15 @@ def serve(settings: LearnerSettings, stop: threading.Event) -> None:
     folder = RunFolder(settings.run, settings.config)
     folder.check()
     cores = _Cores(settings)
-    with suppress(StoppedError), _opened(settings, stop) as session:
+    with (
+        suppress(StoppedError),
+        SharedMemory(on=settings.shared_memory, messages=SHARDS_SHARED) as memory,
+        _opened(settings, memory, stop) as session,
+    ):
         folder.make()
         leadership = None if settings.standby else folder.claim_or_refuse()
         with leadership or nullcontext(), logged_to(folder.log, settings.name), Members(session, keys) as members:
-            _Turns(settings, folder, session, keys, members, cores).take(leadership, stop)
+            _Turns(settings, folder, session, keys, members, cores, memory).take(leadership, stop)
 
 
 class _Cores:
@@ -118,6 +127,7 @@ class _Turns:
         keys: Keys,
         members: Members,
         cores: _Cores,
+        memory: SharedMemory,
     ) -> None:
         self._settings = settings
         self._folder = folder
@@ -125,6 +135,7 @@ class _Turns:
         self._keys = keys
         self._members = members
         self._cores = cores
+        self._memory = memory
         self._incarnation = secrets.randbits(48)
 
     def take(self, leadership: Leadership | None, stop: threading.Event) -> None:
@@ -169,7 +180,7 @@ class _Turns:
                 *(self._keys.run, core.epoch, core.version, core.parameters.size),
                 f"listening at {settings.listen}" if settings.listen else f"connected to {settings.connect}",
             )
-            with Learner(core, run, self._session, self._keys, self._members, me) as learner:
+            with Learner(core, run, self._session, self._keys, self._members, me, self._memory) as learner:
                 learner.run(stop, exit_when_done=settings.exit_when_done)
             return learner.deposed
 
@@ -188,7 +199,7 @@ def catalogue_digests() -> dict[str, str]:
     return {name: room["digest"] for name, room in rooms.items()}
 
 
-def _opened(settings: LearnerSettings, stop: threading.Event) -> Session:
+def _opened(settings: LearnerSettings, memory: SharedMemory, stop: threading.Event) -> Session:
     """Open the session.
 
     Raises:
@@ -196,14 +207,16 @@ def _opened(settings: LearnerSettings, stop: threading.Event) -> Session:
         StoppedError: ``stop`` was set while the router was waited for.
     """
     if settings.listen is not None:
-        return open_router(settings.listen, settings.credentials)
+        return open_router(settings.listen, settings.credentials, shared_memory=memory.on)
     connect = settings.connect or ""
     if not settings.standby:
-        return open_client(connect, CONNECT_S, stop, settings.credentials, SERVICE_LEASE_MS)
+        return open_client(connect, CONNECT_S, stop, settings.credentials, SERVICE_LEASE_MS, shared_memory=memory.on)
     waits = False
     while True:
         try:
-            return open_client(connect, ATTEMPT_S, stop, settings.credentials, SERVICE_LEASE_MS)
+            return open_client(
+                connect, ATTEMPT_S, stop, settings.credentials, SERVICE_LEASE_MS, shared_memory=memory.on
+            )
         except ConnectionFailedError as error:
             if not waits:
                 _log.warning("%s Waiting for it.", error)

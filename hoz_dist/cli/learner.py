@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from hoz_dist.cli.connecting import keys_option
+from hoz_dist.cli.connecting import keys_option, shared_memory_option
 from hoz_dist.cli.run_options import run_config, run_options
 from hoz_dist.errors import InvalidValueError
 from hoz_dist.wire.endpoint import DEFAULT_ENCRYPTED_ENDPOINT, DEFAULT_ENDPOINT
@@ -44,6 +44,7 @@ if TYPE_CHECKING:
 @run_options
 @click.option("--minutes", type=float, help="Budget of training time, minutes.  [default: none, until stopped]")
 @click.option("--frames", type=int, help="Budget of environment frames.  [default: none, until stopped]")
+@shared_memory_option
 @click.option(
     "--checkpoint-seconds",
     type=click.FloatRange(min=1.0),
@@ -70,6 +71,7 @@ def learner_command(
     replay: Path | None,
     *,
     standby: bool,
+    shared_memory: bool,
     exit_when_done: bool,
     quiet: bool,
     **choices: Any,
@@ -108,6 +110,7 @@ def learner_command(
         standby=standby,
         run=run,
         config=config,
+        shared_memory=shared_memory,
         checkpoint_seconds=checkpoint_seconds,
         replay=replay,
         exit_when_done=exit_when_done,
