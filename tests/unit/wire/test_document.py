@@ -3,20 +3,27 @@
 import re
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from hoz_dist.wire.codec import MESSAGES, PROTOCOL_VERSION, checksum, decode, encode
-from hoz_dist.wire.message import Message
-from hoz_dist.wire.messages import Accepted, GradientPush, Refused
+from hoz_dist.wire.epochs import ANOTHER_RUN_S
+from hoz_dist.wire.inbox import LONGEST_WAIT_S, MOST_WAITING, MOST_WAITING_BYTES
+from hoz_dist.wire.keys import Keys
+from hoz_dist.wire.message import SHARD_ELEMENTS, SMALL_BYTES, Message
+from hoz_dist.wire.messages import ParametersHead, ParametersShard
 from hoz_dist.wire.rejection import Reason
+from hoz_dist.wire.rejections import LOG_EVERY_S, MOST_LINES
+from hoz_dist.wire.versions import EXPIRES_S, MOST_BYTES, MOST_READERS
+from hoz_dist.wire.waiting import FIRST_TRY_S, LONGER_TRIES
+from learner.deduplication import MAX_SENDERS, WINDOW
+from tests.wire_examples import EXAMPLES
 
 DOCUMENT = (Path(__file__).parents[3] / "docs" / "wire-protocol.md").read_text(encoding="utf-8")
 
 
 def section(title: str) -> str:
     """The text from a heading to the next one."""
-    found = re.search(rf"^#+ {re.escape(title)}\n(.*?)(?=^#+ )", DOCUMENT, re.MULTILINE | re.DOTALL)
+    found = re.search(rf"^#+ {re.escape(title)}\n(.*?)(?=^#+ |\Z)", DOCUMENT, re.MULTILINE | re.DOTALL)
     assert found is not None, f"no section {title}"
     return found[1]
 
@@ -38,15 +45,60 @@ def test_every_reason_is_documented_and_no_other() -> None:
     assert sorted(re.findall(r"`(\w+)`", " ".join(rows))) == sorted(Reason)
 
 
-def test_the_examples_are_messages_byte_for_byte() -> None:
-    payloads = [bytes.fromhex("".join(block.split())) for block in re.findall(r"```hex\n(.*?)```", DOCUMENT, re.DOTALL)]
-    gradient = decode(payloads[0], GradientPush)
-    assert (gradient.actor, gradient.incarnation, gradient.sequence) == ("a0", 7, 2)
-    assert (gradient.epoch, gradient.version, gradient.frames) == (1, 5, 40)
-    np.testing.assert_array_equal(gradient.gradient, [1, -2])
-    assert f"`{checksum(payloads[0]).hex()}`" in DOCUMENT
-    accepted = decode(payloads[1], Accepted)
-    assert (accepted.epoch, accepted.version) == (1, 6)
-    refused = decode(payloads[2], Refused)
-    assert (refused.reason, refused.detail) == ("stale", "40 versions behind")
-    assert [encode(message) for message in (gradient, accepted, refused)] == payloads
+def test_every_kind_has_an_example() -> None:
+    assert sorted(example.KIND for example in EXAMPLES) == sorted(MESSAGES)
+    assert DOCUMENT.count("```hex") == len(EXAMPLES)
+
+
+@pytest.mark.parametrize("example", EXAMPLES, ids=lambda example: example.KIND)
+def test_the_examples_are_messages_byte_for_byte(example: Message) -> None:
+    text = section(example.KIND)
+    (block,) = re.findall(r"```hex\n(.*?)```", text, re.DOTALL)
+    payload = bytes.fromhex("".join(block.split()))
+    decoded = decode(payload, type(example))
+    assert encode(decoded) == payload
+    assert encode(example) == payload, "the example in the document is not this one"
+
+
+def test_the_checksum_of_the_gradient_is_the_documented_one() -> None:
+    assert f"`{checksum(encode(EXAMPLES[0])).hex()}`" in section("gradient")
+
+
+def test_the_parameters_of_the_examples_belong_together() -> None:
+    head, shard = (decode(encode(one), ParametersHead, ParametersShard) for one in EXAMPLES[6:8])
+    assert isinstance(head, ParametersHead)
+    assert isinstance(shard, ParametersShard)
+    assert head.digest == shard.head.digest == checksum(shard.values.tobytes()).hex()
+
+
+def test_the_documented_limits_are_those_of_the_code() -> None:
+    assert f"shards of {SHARD_ELEMENTS:,} values (512 KiB)" in DOCUMENT
+    assert f"{MOST_WAITING} pushes and {MOST_WAITING_BYTES >> 20} MiB wait at the learner" in DOCUMENT
+    assert f"one that waits {LONGEST_WAIT_S:g} s" in DOCUMENT
+    assert f"keeps a version {EXPIRES_S:g} s after its reader asked\nlast" in DOCUMENT
+    assert f"at most {MOST_READERS} readers and {MOST_BYTES >> 20} MiB" in DOCUMENT
+    assert f"{FIRST_TRY_S:g} s at first" in DOCUMENT
+    assert f"up to {LONGER_TRIES * FIRST_TRY_S:g} s" in DOCUMENT
+    assert f"{SMALL_BYTES >> 10} KiB, and {Message.MOST_VALUES:,} values" in DOCUMENT
+    assert f"{ANOTHER_RUN_S:g} s without the higher one" in DOCUMENT
+    assert f"{WINDOW} sequence numbers behind" in DOCUMENT
+    assert f"the {MAX_SENDERS} senders" in DOCUMENT
+    assert f"first one of each sender and reason in {LOG_EVERY_S:g} s, at most {MOST_LINES} lines" in DOCUMENT
+
+
+def test_the_documented_keys_are_those_of_the_code() -> None:
+    keys = Keys("RUN")
+    told = set(re.findall(r"`hoz/\{run\}(/[^`?]*)[^`]*` \|", section("Keys")))
+    made = {
+        *(keys.config, keys.status, keys.params, keys.shard(0), keys.graph("kitchen"), keys.graph("kitchen/3")),
+        *(
+            keys.plan("kitchen"),
+            keys.grads("a"),
+            keys.rollouts("a"),
+            keys.room("a", room),
+            keys.alive("r", "i", "h", 4),
+        ),
+    }
+    names = {"0": "{shard}", "3": "{number}", "4": "{incarnation}", "kitchen": "{scene}", "a": "{actor}"}
+    names |= {"r": "{role}", "i": "{id}", "h": "{host}"}
+    assert told == {"/" + "/".join(names.get(part, part) for part in key.split("/")[2:]) for key in made}

@@ -1,0 +1,63 @@
+"""The example of each kind of message in docs/wire-protocol.md: small, and the same in every language."""
+
+import numpy as np
+
+from hoz_dist.nav.episode import EpisodeResult
+from hoz_dist.nav.rooms import RoomId
+from hoz_dist.wire.message import Message
+from hoz_dist.wire.messages import (
+    Accepted,
+    Busy,
+    ConfigReply,
+    EpisodesPush,
+    GradientPush,
+    LeftProcess,
+    ParametersHead,
+    ParametersShard,
+    PlanReply,
+    ProcessStatus,
+    Refused,
+    RoomGraphPush,
+    RoomGraphReply,
+    SceneGraphReply,
+    StatusReply,
+)
+from hoz_dist.wire.parameters import head_of
+
+VECTOR = np.array([0.5, -0.25], np.float32)
+HEAD: ParametersHead = head_of(2, 6, VECTOR)
+KITCHEN = RoomId("kitchen", 3)
+CATEGORIES = ("Pan", "Sink")
+NODES = np.array([[0.5, 1.0], [0.0, 0.25]])
+EDGES = np.array([[1.0, 0.5], [0.5, 1.0]])
+
+EXAMPLES: tuple[Message, ...] = (
+    GradientPush("a0", 7, 2, epoch=2, version=5, frames=40, gradient=np.array([1.0, -2.0], np.float32)),
+    EpisodesPush(
+        "a0",
+        7,
+        0,
+        episodes=(EpisodeResult(KITCHEN, 5, success=True, actions=9, moves=4, said_done=True, optimal=7),),
+        policy_loss=-0.5,
+        value_loss=0.25,
+        entropy=1.5,
+    ),
+    RoomGraphPush("a0", 7, 0, KITCHEN, "5f3a", CATEGORIES, NODES, EDGES),
+    Accepted(2, 6),
+    Busy(2),
+    Refused("stale", "40 versions behind", 2),
+    HEAD,
+    ParametersShard(HEAD, 0, VECTOR),
+    ConfigReply("night-3", 2, CATEGORIES, {"method": "hoz", "seed": 3, "learning_rate": 0.001, "minutes": None}),
+    StatusReply(
+        6,
+        2,
+        (ProcessStatus("actor", "a0", "box-1", 7, ("kitchen/3",), 240, 120.5, 1.5, 1),),
+        (LeftProcess("actor", "a1", "box-2", 9, 2.5),),
+        {"stale": 1},
+        {"frames": 240},
+    ),
+    SceneGraphReply(2, "kitchen", 1, (KITCHEN,), CATEGORIES, NODES, EDGES),
+    RoomGraphReply(2, KITCHEN, "5f3a", CATEGORIES, NODES, EDGES),
+    PlanReply(2, 0, 1, 1, (0, 1), 0.5),
+)
