@@ -89,16 +89,9 @@ def test_the_documented_limits_are_those_of_the_code() -> None:
 def test_the_documented_keys_are_those_of_the_code() -> None:
     keys = Keys("RUN")
     told = set(re.findall(r"`hoz/\{run\}(/[^`?]*)[^`]*` \|", section("Keys")))
-    made = {
-        *(keys.config, keys.status, keys.params, keys.shard(0), keys.graph("kitchen"), keys.graph("kitchen/3")),
-        *(
-            keys.plan("kitchen"),
-            keys.grads("a"),
-            keys.rollouts("a"),
-            keys.room("a", room),
-            keys.alive("r", "i", "h", 4),
-        ),
-    }
+    asked = (keys.config, keys.status, keys.params, keys.shard(0), keys.graph("kitchen"), keys.graph("kitchen/3"))
+    pushed = (keys.grads("a"), keys.rollouts("a"), keys.room("a", RoomId("kitchen", 3)))
+    made = (*asked, *pushed, keys.plan("kitchen"), keys.alive("r", "i", "h", 4))
     names = {"0": "{shard}", "3": "{number}", "4": "{incarnation}", "kitchen": "{scene}", "a": "{actor}"}
     names |= {"r": "{role}", "i": "{id}", "h": "{host}"}
     assert told == {"/" + "/".join(names.get(part, part) for part in key.split("/")[2:]) for key in made}
