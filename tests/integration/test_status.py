@@ -93,7 +93,7 @@ def test_a_flood_of_tokens_is_bounded_and_hides_nobody_else(endpoint: str) -> No
         with declare_alive(honest, KEYS, Member("standby", "l1", "h1", 5)):
             until(lambda: any(member.role == "standby" for member in members.current()), "the standby")
         for token in flood:
-            token.undeclare()
+            token.undeclare()  # type: ignore[no-untyped-call]
         until(lambda: not members.current(), "the end of the flood")
         with declare_alive(honest, KEYS, ANNA):
             until(lambda: members.current() == (ANNA,), "anna")
@@ -117,7 +117,7 @@ def test_tokens_that_no_process_of_ours_has_are_left_out(endpoint: str, key: str
         with declare_alive(stranger, KEYS, ANNA):
             until(lambda: members.current() != (), "anna")
             assert members.current() == (ANNA,)
-        token.undeclare()
+        token.undeclare()  # type: ignore[no-untyped-call]
 
 
 def test_members_are_known_again_after_the_router_was_killed(endpoint: str, tmp_path: Path) -> None:
@@ -135,7 +135,7 @@ def test_members_are_known_again_after_the_router_was_killed(endpoint: str, tmp_
         until(lambda: members.current() == (ANNA, ben), "both")
         first.stop(signal.SIGKILL)
         until(lambda: members.current() == (), "silence")
-        token.undeclare()  # while nobody can hear of it
+        token.undeclare()  # type: ignore[no-untyped-call]
         with HozDist(*router, log=tmp_path / "second.log"):
             until(lambda: members.current() == (ANNA,), "anna")
             assert [departure.member for departure in members.left()] == [ben]
