@@ -21,6 +21,10 @@ with open(os.environ["NOTES"], "a") as notes:
     notes.write(line + "\\n")
 """
 """A command that notes how it was called."""
+OVER = "print('\"finished\": true\\n' + ' ' * 100_000)\n"
+"""What `hoz-dist status` says of a run that is over, with more after it than a pipe holds."""
+STAYS = "import signal\nsignal.signal(signal.SIGTERM, lambda *_: sys.exit(0))\nwhile True: signal.pause()\n"
+"""After the note: work until SIGTERM."""
 
 
 class Cluster:
@@ -32,10 +36,12 @@ class Cluster:
         self.bin.mkdir()
         self.notes = folder / "notes"
         self.notes.touch()
-        self.command("hoz-dist", NOTE + "print('\"finished\": true')\n")
+        self.command("hoz-dist", NOTE + OVER)
         self.command("srun", '#!/bin/sh\nwhile [ "$1" != hoz-dist ]; do shift; done\nexec "$@"\n')
         self.command("scontrol", NOTE)
         self.command("scancel", NOTE)
+        # The state of the job, running.
+        self.command("squeue", "#!/bin/sh\necho R\n")
         # Pauses are skipped.
         self.command("sleep", "#!/bin/sh\n")
 
@@ -114,8 +120,8 @@ def test_run_starts_a_router_and_two_learners_of_it(cluster: Cluster, keys: Mapp
 
 @pytest.mark.parametrize("script", [RUN, ACTORS], ids=lambda path: path.name)
 def test_processes_get_the_environment_that_they_need(cluster: Cluster, script: Path) -> None:
-    show = "json.dump(dict(os.environ), open(os.environ['NOTES'] + '.environment', 'w'))\nprint('\"finished\": true')\n"
-    cluster.command("hoz-dist", NOTE + show)
+    show = "json.dump(dict(os.environ), open(os.environ['NOTES'] + '.environment', 'w'))\n"
+    cluster.command("hoz-dist", NOTE + show + OVER)
     cluster.endpoint.parent.mkdir()
     cluster.endpoint.write_text("tcp/node1:7447\n")
     cluster.run(script)
@@ -147,10 +153,6 @@ def test_each_task_is_one_actor_until_the_run_is_over(
     assert actor.count("--scene") == (1 if words else 4)
 
 
-STAYS = "import signal\nsignal.signal(signal.SIGTERM, lambda *_: sys.exit(0))\nwhile True: signal.pause()\n"
-"""After the note: work until SIGTERM."""
-
-
 def wait_for(check: Callable[[], bool], process: subprocess.Popen[bytes]) -> None:
     until(lambda: check() or process.poll() is not None, "the job")
     assert check()
@@ -169,31 +171,39 @@ def test_an_actor_follows_the_run_to_another_node(cluster: Cluster) -> None:
         return bool(actors) and option(actors[-1], "--connect") == "tcp/node2:7447"
 
     wait_for(moved, job)
-    cluster.command("hoz-dist", NOTE + "print('\"finished\": true')\n")
+    cluster.command("hoz-dist", NOTE + OVER)
     cluster.endpoint.write_text("tcp/node3:7447\n")
     assert job.wait(20) == 0
 
 
-def test_an_actor_whose_time_is_over_asks_to_be_started_again(cluster: Cluster) -> None:
-    cluster.command("hoz-dist", NOTE + "if sys.argv[1] != 'actor': sys.exit(1)\n" + STAYS)
+ENDS = pytest.mark.parametrize(("state", "again"), [("R", True), ("CG", False)], ids=["time is over", "cancelled"])
+"""How a job gets SIGTERM: the state that Slurm then tells, and whether it is to be started again."""
+
+
+@ENDS
+def test_an_actor_that_is_stopped_asks_to_be_started_again_unless_it_was_cancelled(
+    cluster: Cluster, state: str, again: bool
+) -> None:
+    cluster.command("squeue", f"#!/bin/sh\necho {state}\n")
+    cluster.command("hoz-dist", NOTE + STAYS)
     cluster.endpoint.parent.mkdir()
     cluster.endpoint.write_text("tcp/node1:7447\n")
     job = cluster.start(ACTORS)
     wait_for(lambda: len(cluster.called("hoz-dist")) == 1, job)
     job.send_signal(signal.SIGTERM)
-    wait_for(lambda: bool(cluster.called("scontrol")), job)
-    assert cluster.called("scontrol") == [["requeue", "8_3"]]
-    cluster.command("hoz-dist", NOTE + "print('\"finished\": true')\n")
-    cluster.endpoint.write_text("tcp/node3:7447\n")
     job.wait(20)
+    assert cluster.called("scontrol") == ([["requeue", "8_3"]] if again else [])
+    assert len(cluster.called("hoz-dist")) == 1
 
 
-def test_a_run_whose_time_is_over_stops_its_steps_first(cluster: Cluster) -> None:
+@ENDS
+def test_a_run_that_is_stopped_stops_its_steps_first(cluster: Cluster, state: str, again: bool) -> None:
     note_pid = "open(os.environ['NOTES'] + '.' + str(os.getpid()), 'w').close()\n"
     stop_all = (
         "import glob, signal\n"
         "for path in glob.glob(os.environ['NOTES'] + '.*'): os.kill(int(path.rpartition('.')[2]), signal.SIGTERM)\n"
     )
+    cluster.command("squeue", f"#!/bin/sh\necho {state}\n")
     cluster.command("hoz-dist", NOTE + STAYS.replace("while", note_pid + "while"))
     cluster.command("scancel", NOTE + stop_all)
     job = cluster.start(RUN)
@@ -201,6 +211,6 @@ def test_a_run_whose_time_is_over_stops_its_steps_first(cluster: Cluster) -> Non
     job.send_signal(signal.SIGTERM)
     job.wait(20)
     assert cluster.called("scancel") == [["--signal=TERM", "7"]]
-    assert cluster.called("scontrol") == [["requeue", "7"]]
+    assert cluster.called("scontrol") == ([["requeue", "7"]] if again else [])
     # Nothing was started again meanwhile.
     assert len(cluster.called("hoz-dist")) == 3
