@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from hoz_dist.nav.rooms import RoomId
 from hoz_dist.wire.codec import MESSAGES, PROTOCOL_VERSION, checksum, decode, encode
 from hoz_dist.wire.epochs import ANOTHER_RUN_S
 from hoz_dist.wire.inbox import LONGEST_WAIT_S, MOST_WAITING, MOST_WAITING_BYTES
