@@ -183,7 +183,7 @@ def wait_until_answering(endpoint: str, alive: Callable[[], bool]) -> None:
 def wait_for_checkpoint(run: Path, version: int) -> None:
     """Wait until a checkpoint of that version, or a later one, is there."""
     pause = threading.Event()
-    for _ in range(200):
+    for _ in range(int(DEADLINE_S / 0.05)):
         stamps = [Stamp.of(path) for path in checkpoint_files(run / FOLDER)]
         if any(stamp.version >= version for stamp in stamps if stamp is not None):
             return
