@@ -107,7 +107,7 @@ def load_credentials(folder: Path | str, roles: Collection[str] = ROLES) -> Cred
     role, name, certificate = _identity(folder / CERTIFICATE_FILE)
     _check_time(certificate, folder)
     if role not in roles:
-        message = f"The key in '{folder}' is of the {role} '{name}'; this needs one of a {' or '.join(roles)}."
+        message = f"The key in '{folder}' is of the {role} '{name}'; this needs one of the role {' or '.join(roles)}."
         raise InvalidValueError(message)
     return Credentials(role, name, folder, certificate.not_valid_after_utc)
 

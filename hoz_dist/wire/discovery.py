@@ -89,8 +89,11 @@ def _only(found: list[ConfigReply]) -> ConfigReply:
 
 def _not_found(session: Session, run: str | None) -> str:
     if run is None:
-        return "The router answers, but no learner: start one with `hoz-dist learner --listen ...`, or wait for it."
+        return (
+            "The router answers, but no learner: start one with `hoz-dist learner --listen ...`, wait for it, or check "
+            "that your key, if you have one, was not withdrawn."
+        )
     others = [config.run for config in find_runs(session)]
     if others:
         return f"No learner of the run '{run}' answers; there are: {', '.join(others)}."
-    return f"No learner of the run '{run}' answers, nor of any other run."
+    return f"No learner of the run '{run}' answers, nor of any other run that your key, if you have one, may ask for."
