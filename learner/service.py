@@ -9,8 +9,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+import numpy as np
+
 from hoz_dist.config import RunConfig
 from hoz_dist.errors import ConnectionFailedError
+from hoz_dist.graph.matching import match
 from hoz_dist.policy.parameters import initial_parameters
 from hoz_dist.sim.catalogue import CATALOGUE_PATH
 from hoz_dist.wire.keys import Keys
@@ -98,9 +101,10 @@ class _Cores:
         self._records = read_updates(settings.replay) if settings.replay is not None else None
         self._initial = initial_parameters(settings.config.policy, settings.config.seed)
         self._room_digests = catalogue_digests()
-        # For nothing but to have it done: with the first optimizer torch imports seconds' worth of modules, for which
-        # nobody shall wait who waits for a leader.
+        # For nothing but to have it done: with the first optimizer torch imports seconds' worth of modules, with
+        # the first merge of rooms comes scipy.optimize, and nobody shall wait for them who waits for a leader.
         self.make(0, None)
+        match(np.eye(2), np.eye(2))
 
     def make(self, epoch: int, checkpoint: Checkpoint | None) -> LearnerCore:
         """Return the core of an epoch that goes on from a checkpoint, or begins the run."""
