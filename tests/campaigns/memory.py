@@ -1,5 +1,6 @@
 """How much memory processes hold for themselves."""
 
+import json
 import re
 import threading
 import time
@@ -47,6 +48,10 @@ class MemoryWatch(Closing):
         self._closed = threading.Event()
         self._thread = threading.Thread(target=self._watch, name="memory")
         self._thread.start()
+
+    def save(self, path: Path) -> None:
+        """Write all samples as JSON, for whoever looks into what a campaign found."""
+        path.write_text(json.dumps(self.samples), encoding="utf-8")
 
     def close(self) -> None:
         """Measure no more."""

@@ -3,6 +3,7 @@
 python -m tests.campaigns.storm --minutes 10 --faults 66 --folder runs/storm
 """
 
+import json
 import random
 import re
 import time
@@ -141,8 +142,10 @@ def storm(folder: Path, cache: Path, port: int, settings: Settings) -> StormFigu
         supervisor.stop(*actors)
         supervisor.stop(*LEARNERS)
         supervisor.stop(ROUTER)
+    memory.save(folder / "memory.json")
     acknowledged = cluster.acknowledged(*actors)
     notes = read_notes(notes_file)
+    (folder / "faults.json").write_text(json.dumps(faults), encoding="utf-8")
     windows = windows_without_leader(notes.leaders, faults, router=ROUTER, learners=LEARNERS, end=ended)
     rate, found = FrameRate(acknowledged), audit(cluster.run, acknowledged)
     figures = StormFigures(
