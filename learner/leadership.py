@@ -134,15 +134,19 @@ class Leadership(Closing):
 
     @property
     def deposed(self) -> bool:
-        """Whether another learner has claimed a newer epoch; looks for a folder and reads one small file."""
+        """Whether another learner has claimed a newer epoch; looks for a folder and reads one small file.
+
+        Raises:
+            OSError: The run folder cannot be read, so that nobody can tell.
+        """
         # The claimer may have been killed before it wrote the file. But looking for a folder is answered from memory on
         # a shared file system, whereas opening a file asks the server.
         if self._fenced:
             return True
         try:
             return int((self._run / EPOCH_FILE).read_text(encoding="utf-8")) != self.epoch
-        except (OSError, ValueError):
-            return False
+        except (FileNotFoundError, ValueError):
+            return False  # somebody has spoilt the file
 
     def replace(self, path: Path, write: Callable[[Path], object]) -> None:
         """Make or replace a file of the run, as `replace_file` does.
