@@ -177,6 +177,7 @@ class Actor:
 
     def _send_report(self) -> None:
         report, self._report = self._report, _Report()
-        self._link.push_episodes(
-            report.episodes, {name: total / report.updates for name, total in report.losses.items()}
-        )
+        losses = {name: total / report.updates for name, total in report.losses.items()}
+        match self._link.push_episodes(report.episodes, losses):
+            case Refused(reason, detail) if reason != Reason.FINISHED:
+                _log.warning("a report of %d episodes was refused (%s): %s", len(report.episodes), reason, detail)

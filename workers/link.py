@@ -4,7 +4,7 @@ import dataclasses
 import secrets
 import threading
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from typing import Final
 
@@ -35,14 +35,18 @@ from hoz_dist.wire.messages import (
 from hoz_dist.wire.parameters import Parameters, ParametersFollower
 from hoz_dist.wire.publishing import NewestSubscriber
 from hoz_dist.wire.push import Pusher
+from hoz_dist.wire.rejection import Reason
 from hoz_dist.wire.session import Session
 from hoz_dist.wire.shared_memory import SharedMemory
+from hoz_dist.wire.waiting import Deadline, StoppedError
 from workers.journal import Journal
 
 JOIN_S: Final = 30.0
 """How long to look for the run: its learner may be starting again."""
 GRAPH_S: Final = 10.0
 """How long a scene graph may take to arrive after the learner has accepted one of its rooms, seconds."""
+STOP_S: Final = 0.5
+"""How soon a wait for a scene graph notices that the process is to stop, seconds."""
 GRAPH_TRIES: Final = 3
 """How often a room graph is pushed if no scene graph comes."""
 FETCH_S: Final = 30.0
@@ -112,6 +116,7 @@ class LearnerLink(Closing):
                     key_of=lambda graph: self._keys.graph(graph.scene),
                     # A restarted learner may have forgotten the last rooms, and count from there.
                     replaces=lambda known, new: (new.epoch, new.version) > (known.epoch, known.version),
+                    heard=lambda graph: self._epochs.hear(graph.epoch),
                 )
             )
             self._open = stack.pop_all()
@@ -199,7 +204,8 @@ class LearnerLink(Closing):
         """Push a room graph; after it is accepted, `scene_graphs` holds a scene graph that has the room.
 
         Raises:
-            ConnectionFailedError: The learner accepts the room graph, but no scene graph comes.
+            ConnectionFailedError: The learner has the room graph, but no scene graph comes.
+            StoppedError: The stop event was set.
         """
         room = RoomId.parse(graph.room)
         push = RoomGraphPush(
@@ -215,14 +221,28 @@ class LearnerLink(Closing):
         key = self._keys.graph(room.scene)
         for _ in range(GRAPH_TRIES):
             reply = self._pusher.push(self._keys.room(self._actor, room), push)
-            if isinstance(reply, Refused):
+            if isinstance(reply, Refused) and reply.reason != Reason.INTERNAL:
                 return reply
-            if self._graphs.wait_for(lambda newest: key in newest and room in newest[key].rooms, GRAPH_S):
+            if self._await_graph(lambda newest: key in newest and room in newest[key].rooms):
                 return reply
             # A learner that was killed right after its answer has forgotten the room: tell it again.
             push = dataclasses.replace(push, sequence=self._next(RoomGraphPush))
-        message = f"The learner accepted the graph of {room}, but its scene graph does not arrive; look at its log."
+        message = f"The learner was told the graph of {room}, but its scene graph does not arrive; look at its log."
         raise ConnectionFailedError(message)
+
+    def _await_graph(self, condition: Callable[[Mapping[str, SceneGraphReply]], bool]) -> bool:
+        """Wait until the scene graphs are as wanted; False when they are not in time.
+
+        Raises:
+            StoppedError: The stop event was set.
+        """
+        deadline = Deadline(GRAPH_S)
+        while not deadline.passed:
+            if self._graphs.wait_for(condition, deadline.within(STOP_S)):
+                return True
+            if self._stop.is_set():
+                raise StoppedError
+        return False
 
     def _next(self, kind: type[Push]) -> int:
         self._sequences[kind] += 1

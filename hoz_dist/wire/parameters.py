@@ -157,7 +157,8 @@ class ParametersFollower(Closing):
     def __init__(self, session: Session, keys: Keys, stop: threading.Event, epochs: Epochs | None = None) -> None:
         self._keys = keys
         self._stop = stop
-        self._asking = Asking(session, stop, epochs or Epochs())
+        known = epochs or Epochs()
+        self._asking = Asking(session, stop, known)
         self._reader = f"r{secrets.token_hex(8)}"
         self._fetched: Parameters | None = None
         self._subscriber = NewestSubscriber(
@@ -165,7 +166,8 @@ class ParametersFollower(Closing):
             keys.params,
             ParametersHead,
             key_of=lambda _: keys.params,
-            replaces=lambda known, new: new.stamp >= known.stamp,
+            replaces=lambda old, new: new.stamp >= old.stamp,
+            heard=lambda head: known.hear(head.epoch),
         )
 
     @property

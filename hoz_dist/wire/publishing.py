@@ -70,6 +70,7 @@ class NewestSubscriber(Closing, Generic[M]):
         expected: Kind of the messages.
         key_of: The key that a message belongs on; on any other it is rejected.
         replaces: Whether the second message takes the place of the first one, which came before it.
+        heard: Told of each message, whether it is kept or not.
     """
 
     def __init__(
@@ -79,8 +80,10 @@ class NewestSubscriber(Closing, Generic[M]):
         expected: type[M],
         key_of: Callable[[M], str],
         replaces: Callable[[M, M], bool],
+        heard: Callable[[M], None] = lambda _: None,
     ) -> None:
         self._expected = expected
+        self._heard = heard
         self._key_of = key_of
         self._replaces = replaces
         self._newest: Mapping[str, M] = {}
@@ -119,6 +122,7 @@ class NewestSubscriber(Closing, Generic[M]):
         except RejectedError as error:
             self._rejections.count(error.reason, error.detail, sender=key)
             return
+        self._heard(message)
         known = self._newest.get(key)
         if known is None or self._replaces(known, message):
             with self._arrived:
