@@ -128,7 +128,7 @@ def withdraw_key(folder: Path, role: str, name: str) -> None:
         # Also when nobody was struck off: a withdrawal that was killed half-way is completed by the next one.
         _write_router_files(folder, register)
     if struck_off is None:
-        message = f"No key was issued for a {role} '{name}'; see '{folder / REGISTER_FILE}' for who has one."
+        message = f"No key was issued for the {role} '{name}'; see '{folder / REGISTER_FILE}' for who has one."
         raise NotFoundError(message)
 
 
