@@ -201,7 +201,7 @@ def _words(error: zenoh.ZError) -> str:
     """Return Zenoh's own words, less the places in its source code; the innermost cause stands in brackets."""
     words = re.sub(r" at \S+\.rs:\d+\.?", "", str(error))
     cause = re.search(r": \[(.*)\]$", words)
-    return (cause[1] if cause else words).rstrip(". ")
+    return " ".join((cause[1] if cause else words).split()).rstrip(". ")
 
 
 def _read_config(path: Path) -> zenoh.Config:
