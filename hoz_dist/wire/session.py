@@ -64,7 +64,7 @@ def open_router(
     if credentials is not None:
         access_control = _read_config(credentials.router_file).get_json("access_control")
         settings |= _keys(credentials) | {"access_control": json.loads(access_control)}
-    return _listen(_configured(zenoh.Config(), settings), ", ".join(endpoints))
+    return _listen(_configured(zenoh.Config(), settings), ", ".join(endpoints), "choose another endpoint with --listen")
 
 
 def open_configured_router(path: Path) -> Session:
@@ -83,7 +83,7 @@ def open_configured_router(path: Path) -> Session:
     if json.loads(config.get_json("mode")) != "router":
         message = f"'{path}' does not configure a router; it must say: mode: \"router\"."
         raise InvalidValueError(message)
-    return _listen(config, f"the endpoints in '{path}'")
+    return _listen(config, f"the endpoints in '{path}'", "mend the file")
 
 
 def open_client(
@@ -174,8 +174,13 @@ def _nobody_answers(connect: str, credentials: "Credentials | None") -> str:
     )
 
 
-def _listen(config: zenoh.Config, where: str) -> Session:
+def _listen(config: zenoh.Config, where: str, advice: str) -> Session:
     """Open a router.
+
+    Args:
+        config: Its configuration.
+        where: What it listens at, for the error.
+        advice: What to do when it cannot, for the error.
 
     Raises:
         ConnectionFailedError: It cannot listen.
@@ -183,7 +188,7 @@ def _listen(config: zenoh.Config, where: str) -> Session:
     try:
         return zenoh.open(config)
     except zenoh.ZError as error:
-        message = f"Cannot listen at {where}: {_reason(error)}; choose another endpoint with --listen."
+        message = f"Cannot listen at {where}: {_reason(error)}; {advice}."
         raise ConnectionFailedError(message) from error
 
 
