@@ -1,5 +1,6 @@
 """A run behind a router with access control, and everybody who has a key for it."""
 
+import json
 import socket
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
@@ -7,6 +8,8 @@ from dataclasses import dataclass
 from datetime import timedelta
 from pathlib import Path
 from typing import Final
+
+import zenoh
 
 from hoz_dist.security.key_folders import RouterPlace, create_authority, issue_keys, withdraw_key
 from hoz_dist.wire.ask import Answer, ask
@@ -16,6 +19,7 @@ from hoz_dist.wire.messages import Accepted, Push
 from hoz_dist.wire.parameters import ParametersPublisher
 from hoz_dist.wire.server import Server
 from hoz_dist.wire.session import Session, open_client, open_router
+from hoz_dist.wire.settings import CLIENT_LEASE_MS, client_settings, tls_settings
 from hoz_dist.wire.snapshots import Snapshots
 from tests import wire_samples as samples
 from tests.integration.commands import HozDist, until
@@ -65,6 +69,16 @@ class Network:
 
     def open(self, holder: str) -> Session:
         return open_client(self.endpoint, timeout_s=10.0, credentials=self.credentials(holder))
+
+    def open_as(self, holder: str, mode: str) -> Session:
+        """Open a session that is not content to be a client."""
+        keys = self.credentials(holder)
+        settings = client_settings(CLIENT_LEASE_MS) | tls_settings(keys.authority, keys.certificate, keys.key)
+        settings |= {"mode": mode, "connect/endpoints": [self.endpoint], "listen/endpoints": []}
+        config = zenoh.Config()
+        for path, value in settings.items():
+            config.insert_json5(path, json.dumps(value))
+        return zenoh.open(config)
 
     def ask(self, session: Session, part: str) -> list[Answer]:
         return ask(session, f"hoz/{KEYS.run}/{part}", timeout_s=5.0)

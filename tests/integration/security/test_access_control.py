@@ -58,6 +58,22 @@ def test_nobody_pushes_under_the_name_of_an_actor(network: Network, stranger: st
     assert len(network.came) == before + 1
 
 
+@pytest.mark.parametrize("mode", ["peer", "router"])
+def test_who_plays_the_router_may_no_more_than_its_key_allows(network: Network, mode: str) -> None:
+    key, push, before = KEYS.grads("a0"), push_of(GradientPush), len(network.came)
+    with network.open_as("actor-a1", mode) as session, network.open("actor-a0") as actor:
+        # As a peer it is answered after a moment, as a router never; each question takes milliseconds.
+        assert any(network.ask(session, "config") for _ in range(200)) is (mode == "peer")
+        assert network.push(session, key, push) == []
+        assert len(network.came) == before
+        with answering(session, KEYS.all_grads, b"poison"), answering(session, "hoz/stolen/config", b"poison"):
+            settle(network, session)
+            assert payloads(actor, "hoz/stolen/config") == []
+            [answer] = network.push(actor, key, push)
+    assert answer.payload != b"poison"
+    assert len(network.came) == before + 1
+
+
 def test_an_actor_does_not_push_for_all_actors_at_once(network: Network) -> None:
     push, before = push_of(GradientPush), len(network.came)
     with network.open("actor-a0") as actor:
