@@ -15,7 +15,7 @@ from hoz_dist.wire.waiting import Deadline, StoppedError
 
 _TIMED_OUT: Final = b"Timeout"
 """What Zenoh itself puts into an error reply when a queryable holds a query too long."""
-_FIRST_PAUSE_S: Final = 0.0002
+_FIRST_PAUSE_S: Final = 0.0001
 _LONGEST_PAUSE_S: Final = 0.005
 _MARGIN_S: Final = 1.0
 """Zenoh ends a query by itself; this much later we stop believing that it will."""
@@ -135,7 +135,7 @@ def ask(
     while not question.poll():
         if stop.wait(pause):
             raise StoppedError
-        pause = min(1.5 * pause, _LONGEST_PAUSE_S)
+        pause = min(1.2 * pause, _LONGEST_PAUSE_S)
     return question.answers
 
 
