@@ -24,4 +24,7 @@ _SETTINGS = {
     "MALLOC_MMAP_MAX_": "0",
     "MALLOC_TRIM_THRESHOLD_": "4000000000",
     "MALLOC_TOP_PAD_": "134217728",
+    # Kept memory is kept per arena, and threads take turns in up to eight of them for each core: a router whose clients
+    # came and went grew from 25 to 70 MB, and stayed at 25 MB with one; pushes became faster by a quarter as well.
+    "MALLOC_ARENA_MAX": "1",
 }
