@@ -204,7 +204,7 @@ class LearnerLink(Closing):
         """Push a room graph; after it is accepted, `scene_graphs` holds a scene graph that has the room.
 
         Raises:
-            ConnectionFailedError: The learner has the room graph, but no scene graph comes.
+            ConnectionFailedError: The learner accepts the room graph, but no scene graph comes.
             StoppedError: The stop event was set.
         """
         room = RoomId.parse(graph.room)
@@ -227,7 +227,9 @@ class LearnerLink(Closing):
                 return reply
             # A learner that was killed right after its answer has forgotten the room: tell it again.
             push = dataclasses.replace(push, sequence=self._next(RoomGraphPush))
-        message = f"The learner was told the graph of {room}, but its scene graph does not arrive; look at its log."
+        if isinstance(reply, Refused):
+            return reply
+        message = f"The learner accepted the graph of {room}, but its scene graph does not arrive; look at its log."
         raise ConnectionFailedError(message)
 
     def _await_graph(self, condition: Callable[[Mapping[str, SceneGraphReply]], bool]) -> bool:
