@@ -1,13 +1,14 @@
 """Recognises pushes that were sent again, in bounded memory."""
 
-from collections import OrderedDict
+from collections import Counter, OrderedDict
 from collections.abc import Iterable
 from typing import Final, NamedTuple
 
 WINDOW: Final = 64
 """How far behind an incarnation's newest sequence number a first arrival is still told from a repeated one."""
 MAX_SENDERS: Final = 4096
-"""Senders remembered; the one that was silent longest is forgotten first."""
+"""Senders remembered. Of the actor that has most of them, the one that was silent longest is forgotten first: whoever
+invents incarnations pushes out its own."""
 
 
 class Sender(NamedTuple):
@@ -59,7 +60,8 @@ class SeenPushes:
             newest = sequence
         self._seen[sender] = (newest, taken | 1 << newest - sequence)
         if len(self._seen) > MAX_SENDERS:
-            self._seen.popitem(last=False)
+            ((most, _),) = Counter(known.actor for known in self._seen).most_common(1)
+            del self._seen[next(known for known in self._seen if known.actor == most)]
 
     def rows(self) -> list[list[object]]:
         """Return the table as JSON values, the sender that was silent longest first."""

@@ -15,7 +15,7 @@ from typing import Final, Self
 from hoz_dist.graph.room_graph import RoomGraph
 from hoz_dist.graph.scene_graph import SceneGraph
 from hoz_dist.nav.categories import TARGETS
-from hoz_dist.wire.inbox import Request
+from hoz_dist.wire.inbox import Inbox, Request
 from hoz_dist.wire.keys import Keys
 from hoz_dist.wire.liveliness import Member, Members
 from hoz_dist.wire.messages import (
@@ -104,6 +104,7 @@ class Learner:
         self._leader = {"name": me.id, "host": me.host}
         self._status = core.status(time.monotonic())
         self._rejections = Rejections()
+        self._inbox = Inbox()
         self._done_since: float | None = None
         self._updates_disk = Outage(_log, "cannot record updates (%s); training on", "updates are recorded again")
         self._scalars_disk = Outage(_log, "cannot log to TensorBoard (%s); training on", "logging to TensorBoard again")
@@ -121,7 +122,7 @@ class Learner:
             graphs: list[RoomGraph | SceneGraph] = [*core.graphs.rooms.values(), *core.graphs.scenes.values()]
             # The last thing that opens: what it answers with is all there.
             self._server = stack.enter_context(
-                Server(session, keys, snapshots, rejections=self._rejections, graphs=graphs)
+                Server(session, keys, snapshots, rejections=self._rejections, graphs=graphs, inbox=self._inbox)
             )
             self._open = stack.pop_all()
 
@@ -140,7 +141,7 @@ class Learner:
         """Work until ``stop`` is set or another learner leads; or, if wanted, until the run is over and known to be."""
         renew_at = record_at = time.monotonic()
         while not stop.is_set() and not (exit_when_done and self._may_leave()):
-            request = self._server.inbox.take(TICK_S)
+            request = self._inbox.take(TICK_S)
             now = time.monotonic()
             # After the wait, and before the push is handled: this process may have stood still in between.
             if not self._leads(now):
@@ -167,7 +168,7 @@ class Learner:
             processes=live_processes(self._members, actors, rejected),
             left=left_processes(self._members),
             rejected=self._rejections.by_reason(),
-            details={"run": self._name, "leader": self._leader, **status},
+            details={"run": self._name, "leader": self._leader, "busy": self._inbox.put_off, **status},
         )
 
     def _handle(self, request: Request, now: float) -> None:

@@ -146,7 +146,4 @@ def _identity(keys: Path | None, name: str | None, role: str) -> "tuple[Credenti
     credentials = load_credentials(keys, [role])
     if role != "learner":
         return credentials, check_name("learner", name or host_name())
-    if name not in (None, credentials.name):
-        message = f"The key in '{keys}' is of the learner '{credentials.name}', not '{name}'; leave out --name."
-        raise InvalidValueError(message)
-    return credentials, credentials.name
+    return credentials, credentials.own_name(name)

@@ -33,6 +33,8 @@ def status_page(status: dict[str, Any]) -> RenderableType:
     if namesakes := _namesakes_line(status["processes"]):
         parts.append(Text(namesakes))
     parts.append(Text(f"Rejected messages: {_counts(status['rejected']) or 'none'}"))
+    if busy := status.get("busy"):
+        parts.append(Text(f"Told to wait (busy): {busy:,} times"))
     return Group(*parts)
 
 
@@ -46,6 +48,8 @@ def status_line(status: dict[str, Any]) -> str:
         parts.append("left: " + " + ".join(names + more))
     if status["rejected"]:
         parts.append(f"rejected: {_counts(status['rejected'])}")
+    if busy := status.get("busy"):
+        parts.append(f"busy: {busy:,}")
     line = ", ".join(parts)
     namesakes = _namesakes_line(status["processes"])
     return f"{line}; {namesakes}" if namesakes else line

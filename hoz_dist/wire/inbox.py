@@ -73,6 +73,9 @@ class Inbox:
         most: Largest number of requests that wait.
         most_bytes: Largest number of bytes of all that wait; one request may always wait.
         longest_wait_s: How long a request waits, seconds.
+
+    Attributes:
+        put_off: Number of requests that were put off, for want of room or because they waited too long.
     """
 
     def __init__(
@@ -87,20 +90,24 @@ class Inbox:
         self._requests: deque[Request] = deque()
         self._bytes = 0
         self._filled = threading.Condition()
+        self.put_off = 0
 
     def __len__(self) -> int:
         return len(self._requests)
 
-    def offer(self, request: Request) -> bool:
-        """Add a request at the end; False when there is no room."""
+    def add(self, request: Request) -> None:
+        """Add a request at the end, or put it off when there is no room."""
         with self._filled:
             full = len(self._requests) >= self._most or self._bytes + request.size > self._most_bytes
-            if full and self._requests:
-                return False
-            self._requests.append(request)
-            self._bytes += request.size
-            self._filled.notify()
-            return True
+            full = full and bool(self._requests)
+            if full:
+                self.put_off += 1
+            else:
+                self._requests.append(request)
+                self._bytes += request.size
+                self._filled.notify()
+        if full:
+            request.put_off()
 
     def take(self, timeout_s: float) -> Request | None:
         """Remove and return the oldest request; None when none comes in time."""
@@ -117,6 +124,7 @@ class Inbox:
         with self._filled:
             while self._requests and self._requests[0].arrived < too_old:
                 late.append(self._pop())
+            self.put_off += len(late)
         for request in late:
             request.put_off()
 

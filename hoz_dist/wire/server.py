@@ -111,9 +111,7 @@ class Server(Closing):
             self.rejections.count(error.reason, error.detail, sender_of(key))
             answer(query, key, Refused.of(error, self._epoch))
             return
-        request = Request(query, message, size, self.rejections, self._epoch)
-        if not self.inbox.offer(request):
-            request.put_off()
+        self.inbox.add(Request(query, message, size, self.rejections, self._epoch))
 
     def _checked(self, query: Query, key: str, expected: type[Push]) -> tuple[Push, int]:
         """Return the message of a push, and the length of its encoded form.

@@ -52,6 +52,16 @@ def test_the_sender_that_was_silent_longest_is_forgotten_first() -> None:
     assert (Sender("gradient", "alice", 1), 0) not in seen
 
 
+def test_an_actor_that_invents_incarnations_pushes_out_only_its_own() -> None:
+    seen = SeenPushes()
+    bob = Sender("gradient", "bob", 1)
+    seen.add(bob, 0)
+    for incarnation in range(2 * MAX_SENDERS):
+        seen.add(Sender("gradient", "mallory", incarnation), 0)
+    assert len(seen.rows()) == MAX_SENDERS
+    assert (bob, 0) in seen
+
+
 def test_the_table_survives_json() -> None:
     seen = SeenPushes()
     for sequence in (1, 2, 5, 2**40):
