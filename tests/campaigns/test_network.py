@@ -21,7 +21,7 @@ pytestmark = pytest.mark.integration
 
 def test_a_link_that_was_cut_heals(tmp_path: Path, cache: Path) -> None:
     link = BadLink(delay_ms=5.0, loss_percent=1)
-    settings = Settings(link, warm_up_s=0.0, measure_s=1.0, cut_s=6.0, cut_far=False)
+    settings = Settings(link, warm_up_s=0.0, measure_s=1.0, cut_s=5.0, cut_far=False)
     figures = network(tmp_path / "network", cache, settings)
     assert figures.wrong == []
     assert figures.far_accepted > 0

@@ -11,7 +11,7 @@ pytestmark = pytest.mark.integration
 
 
 def test_a_standby_takes_over(free_port: int, tmp_path: Path, cache: Path) -> None:
-    times = Times(warm_up=0.0, before=1.0, give_up=5.0)
+    times = Times(warm_up=0.0, before=1.0, give_up=1.0)
     figures = recovery(tmp_path / "recovery", cache, free_port, ["leader"], ["kill"], 1, times)
     assert figures.recoveries[0].first_seconds is not None
     assert figures.recoveries[0].take_over_seconds is not None

@@ -11,10 +11,10 @@ pytestmark = pytest.mark.integration
 
 
 def test_short_storm(free_port: int, tmp_path: Path, cache: Path) -> None:
-    settings = Settings(seconds=12.0, faults=6, actors=2, seed=1, pause_s=3.0, restart_s=0.2, calm_s=2.0)
+    settings = Settings(seconds=7.0, faults=5, actors=2, seed=11, pause_s=2.5, restart_s=0.1, calm_s=1.0)
     figures = storm(tmp_path / "storm", cache, free_port, settings)
     assert figures.wrong == []
-    assert figures.kills + figures.pauses == 6
+    assert figures.kills + figures.pauses == 5
     assert figures.audit.covered["gradient"] > 10
 
 
