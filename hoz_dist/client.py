@@ -19,14 +19,13 @@ from hoz_dist.graph.room_graph import RoomGraph
 from hoz_dist.graph.scene_graph import SceneGraph
 from hoz_dist.nav.categories import TARGETS, category_index, scene_index
 from hoz_dist.nav.rooms import RoomId
-from hoz_dist.wire.ask import ask, messages_in
-from hoz_dist.wire.codec import PROTOCOL_VERSION
-from hoz_dist.wire.discovery import find_run, find_runs
-from hoz_dist.wire.endpoint import DEFAULT_ENDPOINT
-from hoz_dist.wire.epochs import of_highest_epoch
-from hoz_dist.wire.graphs import plan_of, room_graph_of, scene_graph_of
-from hoz_dist.wire.keys import Keys
-from hoz_dist.wire.messages import (
+from hoz_dist.waiting import Backoff, Deadline
+from hoz_dist.wire.client.discovery import find_run, find_runs
+from hoz_dist.wire.client.epochs import of_highest_epoch
+from hoz_dist.wire.protocol.codec import PROTOCOL_VERSION
+from hoz_dist.wire.protocol.graphs import plan_of, room_graph_of, scene_graph_of
+from hoz_dist.wire.protocol.keys import Keys
+from hoz_dist.wire.protocol.messages import (
     ConfigReply,
     PlanReply,
     Refused,
@@ -34,13 +33,14 @@ from hoz_dist.wire.messages import (
     SceneGraphReply,
     StatusReply,
 )
-from hoz_dist.wire.rejection import Reason, RejectedError
-from hoz_dist.wire.session import open_client
-from hoz_dist.wire.snapshots import SEEN_SEPARATOR
-from hoz_dist.wire.waiting import Backoff, Deadline
+from hoz_dist.wire.protocol.rejection import Reason, RejectedError
+from hoz_dist.wire.serving.snapshots import SEEN_SEPARATOR
+from hoz_dist.wire.transport.ask import ask, messages_in
+from hoz_dist.wire.transport.endpoint import DEFAULT_ENDPOINT
+from hoz_dist.wire.transport.session import open_client
 
 if TYPE_CHECKING:
-    from hoz_dist.wire.credentials import Credentials
+    from hoz_dist.wire.transport.credentials import Credentials
 
 ANSWER_S: Final = 2.0
 """How long an answer may take, seconds."""

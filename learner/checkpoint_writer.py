@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Final
 
 from hoz_dist.errors import HozError
-from hoz_dist.wire.outage import Outage
+from hoz_dist.outage import Outage
 from learner.checkpoint import Checkpoint, Files, save_checkpoint
 from learner.leadership import DeposedError
 

@@ -10,7 +10,7 @@ from hoz_dist.graph.room_graph import RoomGraph
 from hoz_dist.graph.scene_graph import SceneGraph, merge_rooms
 from hoz_dist.nav.categories import TARGETS
 from hoz_dist.nav.rooms import RoomId
-from hoz_dist.wire.rejection import Reason, RejectedError
+from hoz_dist.wire.protocol.rejection import Reason, RejectedError
 
 SAME_WITHIN: Final = 1e-6
 """Two graphs of a room are the same when no entry differs by more: machines differ in their last digits."""

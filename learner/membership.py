@@ -4,8 +4,8 @@ import time
 from collections.abc import Mapping
 from typing import Any
 
-from hoz_dist.wire.liveliness import Members
-from hoz_dist.wire.messages import LeftProcess, ProcessStatus
+from hoz_dist.wire.membership.liveliness import Members
+from hoz_dist.wire.protocol.messages import LeftProcess, ProcessStatus
 
 
 def live_processes(

@@ -16,12 +16,12 @@ from hoz_dist.errors import ConnectionFailedError
 from hoz_dist.graph.matching import match
 from hoz_dist.policy.parameters import initial_parameters
 from hoz_dist.sim.catalogue import CATALOGUE_PATH
-from hoz_dist.wire.keys import Keys
-from hoz_dist.wire.liveliness import Member, Members, declare_alive, host_name
-from hoz_dist.wire.session import Session, is_connected, open_client, open_router
-from hoz_dist.wire.settings import SERVICE_LEASE_MS
-from hoz_dist.wire.shared_memory import SharedMemory
-from hoz_dist.wire.waiting import StoppedError
+from hoz_dist.waiting import StoppedError
+from hoz_dist.wire.membership.liveliness import Member, Members, declare_alive, host_name
+from hoz_dist.wire.protocol.keys import Keys
+from hoz_dist.wire.transport.session import Session, is_connected, open_client, open_router
+from hoz_dist.wire.transport.settings import SERVICE_LEASE_MS
+from hoz_dist.wire.transport.shared_memory import SharedMemory
 from learner.checkpoint import Checkpoint
 from learner.core import LearnerCore
 from learner.leadership import DeposedError, Leadership
@@ -32,7 +32,7 @@ from learner.serving import Learner
 from learner.standby import ReadAhead, follow
 
 if TYPE_CHECKING:
-    from hoz_dist.wire.credentials import Credentials
+    from hoz_dist.wire.transport.credentials import Credentials
 
 CONNECT_S: Final = 30.0
 """How long a learner that is no standby tries to reach its router, seconds; it may be starting."""

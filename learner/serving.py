@@ -15,10 +15,10 @@ from typing import Final, Self
 from hoz_dist.graph.room_graph import RoomGraph
 from hoz_dist.graph.scene_graph import SceneGraph
 from hoz_dist.nav.categories import TARGETS
-from hoz_dist.wire.inbox import Inbox, Request
-from hoz_dist.wire.keys import Keys
-from hoz_dist.wire.liveliness import Member, Members
-from hoz_dist.wire.messages import (
+from hoz_dist.outage import Outage
+from hoz_dist.wire.membership.liveliness import Member, Members
+from hoz_dist.wire.protocol.keys import Keys
+from hoz_dist.wire.protocol.messages import (
     ConfigReply,
     EpisodesPush,
     GradientPush,
@@ -26,14 +26,14 @@ from hoz_dist.wire.messages import (
     RoomGraphPush,
     StatusReply,
 )
-from hoz_dist.wire.outage import Outage
-from hoz_dist.wire.parameters import ParametersPublisher
-from hoz_dist.wire.rejection import Reason
-from hoz_dist.wire.rejections import Rejections
-from hoz_dist.wire.server import Server
-from hoz_dist.wire.session import Session
-from hoz_dist.wire.shared_memory import SharedMemory
-from hoz_dist.wire.snapshots import Snapshots
+from hoz_dist.wire.protocol.rejection import Reason
+from hoz_dist.wire.protocol.rejections import Rejections
+from hoz_dist.wire.serving.inbox import Inbox, Request
+from hoz_dist.wire.serving.parameters import ParametersPublisher
+from hoz_dist.wire.serving.server import Server
+from hoz_dist.wire.serving.snapshots import Snapshots
+from hoz_dist.wire.transport.session import Session
+from hoz_dist.wire.transport.shared_memory import SharedMemory
 from learner.checkpoint import Checkpoint
 from learner.checkpoint_writer import CheckpointWriter
 from learner.core import LearnerCore

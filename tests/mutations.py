@@ -11,8 +11,8 @@ from typing import Any, Final
 
 import msgpack
 
-from hoz_dist.wire.codec import encode
-from hoz_dist.wire.message import Message
+from hoz_dist.wire.protocol.codec import encode
+from hoz_dist.wire.protocol.message import Message
 
 Mutation = Callable[[bytes, bytes, random.Random], bytes]
 """From a valid message, another valid one, and a generator of random numbers."""

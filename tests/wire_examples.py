@@ -4,8 +4,8 @@ import numpy as np
 
 from hoz_dist.nav.episode import EpisodeResult
 from hoz_dist.nav.rooms import RoomId
-from hoz_dist.wire.message import Message
-from hoz_dist.wire.messages import (
+from hoz_dist.wire.protocol.message import Message
+from hoz_dist.wire.protocol.messages import (
     Accepted,
     Busy,
     ConfigReply,
@@ -22,7 +22,7 @@ from hoz_dist.wire.messages import (
     SceneGraphReply,
     StatusReply,
 )
-from hoz_dist.wire.parameters import head_of
+from hoz_dist.wire.protocol.parameters import head_of
 
 VECTOR = np.array([0.5, -0.25], np.float32)
 HEAD: ParametersHead = head_of(2, 6, VECTOR)

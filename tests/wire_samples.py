@@ -10,11 +10,10 @@ from hoz_dist.graph.scene_graph import SceneGraph
 from hoz_dist.nav.categories import TARGETS
 from hoz_dist.nav.episode import EpisodeResult
 from hoz_dist.nav.rooms import RoomId
-from hoz_dist.wire.graphs import room_graph_reply, scene_graph_reply
-from hoz_dist.wire.inbox import Inbox
-from hoz_dist.wire.keys import Keys
-from hoz_dist.wire.message import Message
-from hoz_dist.wire.messages import (
+from hoz_dist.wire.protocol.graphs import room_graph_reply, scene_graph_reply
+from hoz_dist.wire.protocol.keys import Keys
+from hoz_dist.wire.protocol.message import Message
+from hoz_dist.wire.protocol.messages import (
     Accepted,
     Busy,
     ConfigReply,
@@ -29,9 +28,10 @@ from hoz_dist.wire.messages import (
     RoomGraphPush,
     StatusReply,
 )
-from hoz_dist.wire.server import Server
-from hoz_dist.wire.session import Session, open_router
-from hoz_dist.wire.snapshots import Snapshots
+from hoz_dist.wire.serving.inbox import Inbox
+from hoz_dist.wire.serving.server import Server
+from hoz_dist.wire.serving.snapshots import Snapshots
+from hoz_dist.wire.transport.session import Session, open_router
 
 KEYS = Keys("run-1")
 ROOM = RoomId("kitchen", 3)

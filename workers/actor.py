@@ -22,10 +22,10 @@ from hoz_dist.nav.rooms import RoomId
 from hoz_dist.sim.batch_env import BatchEnv
 from hoz_dist.sim.view_source import ViewSource
 from hoz_dist.sim.view_store import ViewStore
-from hoz_dist.wire.graphs import scene_graph_of
-from hoz_dist.wire.messages import Accepted, Refused, SceneGraphReply
-from hoz_dist.wire.rejection import Reason
-from hoz_dist.wire.waiting import StoppedError
+from hoz_dist.waiting import StoppedError
+from hoz_dist.wire.protocol.graphs import scene_graph_of
+from hoz_dist.wire.protocol.messages import Accepted, Refused, SceneGraphReply
+from hoz_dist.wire.protocol.rejection import Reason
 from workers.collector import Collector
 from workers.link import LearnerLink
 from workers.preparation import RoomPreparation

@@ -18,12 +18,15 @@ from hoz_dist.graph.room_graph import RoomGraph
 from hoz_dist.nav.categories import TARGETS
 from hoz_dist.nav.episode import EpisodeResult
 from hoz_dist.nav.rooms import RoomId
-from hoz_dist.wire.discovery import find_run
-from hoz_dist.wire.epochs import Epochs
-from hoz_dist.wire.keys import Keys
-from hoz_dist.wire.liveliness import Member, declare_alive, host_name
-from hoz_dist.wire.message import MAX_EPISODES
-from hoz_dist.wire.messages import (
+from hoz_dist.waiting import Deadline, StoppedError
+from hoz_dist.wire.client.discovery import find_run
+from hoz_dist.wire.client.epochs import Epochs
+from hoz_dist.wire.client.parameters import ParametersFollower
+from hoz_dist.wire.client.push import Pusher
+from hoz_dist.wire.membership.liveliness import Member, declare_alive, host_name
+from hoz_dist.wire.protocol.keys import Keys
+from hoz_dist.wire.protocol.message import MAX_EPISODES
+from hoz_dist.wire.protocol.messages import (
     Accepted,
     EpisodesPush,
     GradientPush,
@@ -32,13 +35,11 @@ from hoz_dist.wire.messages import (
     RoomGraphPush,
     SceneGraphReply,
 )
-from hoz_dist.wire.parameters import Parameters, ParametersFollower
-from hoz_dist.wire.publishing import NewestSubscriber
-from hoz_dist.wire.push import Pusher
-from hoz_dist.wire.rejection import Reason
-from hoz_dist.wire.session import Session
-from hoz_dist.wire.shared_memory import SharedMemory
-from hoz_dist.wire.waiting import Deadline, StoppedError
+from hoz_dist.wire.protocol.parameters import Parameters
+from hoz_dist.wire.protocol.rejection import Reason
+from hoz_dist.wire.transport.publishing import NewestSubscriber
+from hoz_dist.wire.transport.session import Session
+from hoz_dist.wire.transport.shared_memory import SharedMemory
 from workers.journal import Journal
 
 JOIN_S: Final = 30.0

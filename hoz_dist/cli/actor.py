@@ -66,9 +66,9 @@ def actor_command(
     from contextlib import ExitStack, suppress
 
     from hoz_dist.nav.rooms import training_rooms
-    from hoz_dist.wire.session import open_client
-    from hoz_dist.wire.shared_memory import SharedMemory
-    from hoz_dist.wire.waiting import StoppedError
+    from hoz_dist.waiting import StoppedError
+    from hoz_dist.wire.transport.session import open_client
+    from hoz_dist.wire.transport.shared_memory import SharedMemory
 
     rooms = training_rooms(scenes)
     credentials = credentials_in(keys, ["actor"])

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Final
 
 import click
 
-from hoz_dist.wire.endpoint import DEFAULT_ENDPOINT
+from hoz_dist.wire.transport.endpoint import DEFAULT_ENDPOINT
 
 if TYPE_CHECKING:
-    from hoz_dist.wire.credentials import Credentials
+    from hoz_dist.wire.transport.credentials import Credentials
 
 READERS: Final = ("viewer", "actor", "learner")
 """Roles that may ask questions."""
@@ -48,6 +48,6 @@ def credentials_in(keys: Path | None, roles: Collection[str]) -> "Credentials | 
     """
     if keys is None:
         return None
-    from hoz_dist.wire.credentials import load_credentials
+    from hoz_dist.wire.transport.credentials import load_credentials
 
     return load_credentials(keys, roles)

@@ -8,7 +8,7 @@ import click
 
 from hoz_dist.cli.options import echo_json, json_option
 from hoz_dist.errors import InvalidValueError
-from hoz_dist.wire.endpoint import DEFAULT_ENCRYPTED_ENDPOINT, check_endpoint, is_encrypted
+from hoz_dist.wire.transport.endpoint import DEFAULT_ENCRYPTED_ENDPOINT, check_endpoint, is_encrypted
 
 if TYPE_CHECKING:
     from hoz_dist.security.key_folders import RouterPlace

@@ -13,7 +13,7 @@ from hoz_dist.cli.processes import Child, Children
 from hoz_dist.cli.progress import Progress
 from hoz_dist.client import HozClient
 from hoz_dist.errors import ConnectionFailedError, HozError
-from hoz_dist.wire.waiting import Deadline
+from hoz_dist.waiting import Deadline
 
 START_S: Final = 60.0
 """How long the learner may take to answer for the first time, seconds."""

@@ -8,10 +8,10 @@ import click
 from hoz_dist.cli.connecting import keys_option, shared_memory_option
 from hoz_dist.cli.run_options import run_config, run_options
 from hoz_dist.errors import InvalidValueError
-from hoz_dist.wire.endpoint import DEFAULT_ENCRYPTED_ENDPOINT, DEFAULT_ENDPOINT
+from hoz_dist.wire.transport.endpoint import DEFAULT_ENCRYPTED_ENDPOINT, DEFAULT_ENDPOINT
 
 if TYPE_CHECKING:
-    from hoz_dist.wire.credentials import Credentials
+    from hoz_dist.wire.transport.credentials import Credentials
 
 
 @click.command("learner")
@@ -136,12 +136,12 @@ def _identity(keys: Path | None, name: str | None, role: str) -> "tuple[Credenti
     Raises:
         HozError: The keys cannot be used, or the name cannot, or is not that of the key.
     """
-    from hoz_dist.wire.keys import check_name
-    from hoz_dist.wire.liveliness import host_name
+    from hoz_dist.wire.membership.liveliness import host_name
+    from hoz_dist.wire.protocol.keys import check_name
 
     if keys is None:
         return None, check_name("learner", name or host_name())
-    from hoz_dist.wire.credentials import load_credentials
+    from hoz_dist.wire.transport.credentials import load_credentials
 
     credentials = load_credentials(keys, [role])
     if role != "learner":

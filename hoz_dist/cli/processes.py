@@ -11,7 +11,7 @@ from types import TracebackType
 from typing import Final, Self
 
 from hoz_dist.errors import HozError
-from hoz_dist.wire.environment import child_environment
+from hoz_dist.wire.transport.environment import child_environment
 
 _log = logging.getLogger(__name__)
 STOP_S: Final = 20.0

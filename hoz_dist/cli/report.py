@@ -18,7 +18,7 @@ from hoz_dist.nav.episode import Episode
 from hoz_dist.sim.catalogue import load_room
 from hoz_dist.viz.trajectory import Trajectory, draw_trajectories
 from hoz_dist.viz.zones import png, scene_graph_figure
-from hoz_dist.wire.endpoint import DEFAULT_ENDPOINT
+from hoz_dist.wire.transport.endpoint import DEFAULT_ENDPOINT
 from learner.checkpoint import Checkpoint, load_checkpoint
 
 RESULTS_FILE: Final = "evaluation.json"

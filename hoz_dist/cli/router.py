@@ -6,7 +6,7 @@ import click
 
 from hoz_dist.cli.connecting import credentials_in, keys_option, shared_memory_option
 from hoz_dist.errors import InvalidValueError
-from hoz_dist.wire.endpoint import DEFAULT_ENCRYPTED_ENDPOINT, DEFAULT_ENDPOINT
+from hoz_dist.wire.transport.endpoint import DEFAULT_ENCRYPTED_ENDPOINT, DEFAULT_ENDPOINT
 
 
 @click.command("router")
@@ -33,8 +33,8 @@ def router_command(*, listen: tuple[str, ...], keys: Path | None, shared_memory:
     import signal
     import threading
 
-    from hoz_dist.wire.session import open_configured_router, open_router
-    from hoz_dist.wire.shared_memory import SharedMemory
+    from hoz_dist.wire.transport.session import open_configured_router, open_router
+    from hoz_dist.wire.transport.shared_memory import SharedMemory
 
     if config is not None and (listen or keys is not None or shared_memory):
         message = "--config says everything: leave out the other options, or leave out --config."

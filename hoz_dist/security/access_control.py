@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any, Final, NamedTuple
 
 from hoz_dist.security.register import Identity
-from hoz_dist.wire.credentials import common_name
+from hoz_dist.wire.transport.credentials import common_name
 
 _RUN: Final = "hoz/*"
 _IN, _OUT = "ingress", "egress"

@@ -20,8 +20,8 @@ from hoz_dist.errors import InvalidValueError, NotFoundError
 from hoz_dist.security.authority import Authority, KeyPair
 from hoz_dist.security.register import REGISTER_FILE, Identity, Register, check_identity
 from hoz_dist.security.router_file import router_file
-from hoz_dist.wire.credentials import AUTHORITY_FILE, CERTIFICATE_FILE, KEY_FILE, ROUTER_FILE, common_name
-from hoz_dist.wire.endpoint import DEFAULT_ENCRYPTED_ENDPOINT
+from hoz_dist.wire.transport.credentials import AUTHORITY_FILE, CERTIFICATE_FILE, KEY_FILE, ROUTER_FILE, common_name
+from hoz_dist.wire.transport.endpoint import DEFAULT_ENCRYPTED_ENDPOINT
 
 AUTHORITY_KEY_FILE: Final = "ca.key"
 _LOCK_FILE: Final = ".lock"

@@ -8,8 +8,8 @@ from typing import Final
 
 from hoz_dist.atomic import replace_file
 from hoz_dist.errors import DamagedFileError, InvalidValueError, UnknownNameError
-from hoz_dist.wire.credentials import ROLES
-from hoz_dist.wire.keys import check_name
+from hoz_dist.wire.protocol.keys import check_name
+from hoz_dist.wire.transport.credentials import ROLES
 
 REGISTER_FILE: Final = "issued.json"
 LONGEST_NAME: Final = 64 - len("learner-")

@@ -7,8 +7,8 @@ from typing import Any, Final
 
 from hoz_dist.security.access_control import access_control
 from hoz_dist.security.register import Identity
-from hoz_dist.wire.credentials import AUTHORITY_FILE, CERTIFICATE_FILE, KEY_FILE
-from hoz_dist.wire.settings import router_settings, tls_settings
+from hoz_dist.wire.transport.credentials import AUTHORITY_FILE, CERTIFICATE_FILE, KEY_FILE
+from hoz_dist.wire.transport.settings import router_settings, tls_settings
 
 _HEAD: Final = """\
 // Configuration of the Zenoh router '{name}' for hoz-dist: run `zenohd --config router.json5` (version 1.10), or

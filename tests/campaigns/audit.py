@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, NamedTuple
 
-from hoz_dist.wire.message import MAX_EPISODES
+from hoz_dist.wire.protocol.message import MAX_EPISODES
 from learner.checkpoint import Checkpoint, load_checkpoint
 from learner.deduplication import SeenPushes, Sender
 from learner.replay import read_updates

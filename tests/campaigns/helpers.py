@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Final
 
-from hoz_dist.wire.environment import child_environment
+from hoz_dist.wire.transport.environment import child_environment
 
 STOP_S: Final = 120.0
 """How long a helper may take to end what is under way, seconds."""

@@ -17,13 +17,13 @@ from typing import IO, Any, Final
 import click
 
 from hoz_dist.cli.child import die_with_parent
-from hoz_dist.wire.ask import ask
-from hoz_dist.wire.codec import decode
-from hoz_dist.wire.keys import Keys
-from hoz_dist.wire.liveliness import Members
-from hoz_dist.wire.messages import SceneGraphReply, StatusReply
-from hoz_dist.wire.rejection import RejectedError
-from hoz_dist.wire.session import Session, open_client
+from hoz_dist.wire.membership.liveliness import Members
+from hoz_dist.wire.protocol.codec import decode
+from hoz_dist.wire.protocol.keys import Keys
+from hoz_dist.wire.protocol.messages import SceneGraphReply, StatusReply
+from hoz_dist.wire.protocol.rejection import RejectedError
+from hoz_dist.wire.transport.ask import ask
+from hoz_dist.wire.transport.session import Session, open_client
 
 ASK_EVERY_S: Final = 0.05
 STATUS_EVERY: Final = 20

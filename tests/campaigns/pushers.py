@@ -23,11 +23,11 @@ import numpy as np
 import zenoh
 
 from hoz_dist.cli.child import die_with_parent
-from hoz_dist.wire.ask import ask
-from hoz_dist.wire.codec import checksum, decode, encode
-from hoz_dist.wire.keys import Keys
-from hoz_dist.wire.messages import Accepted, Busy, GradientPush, ParametersHead, PushReply, Refused
-from hoz_dist.wire.session import open_client
+from hoz_dist.wire.protocol.codec import checksum, decode, encode
+from hoz_dist.wire.protocol.keys import Keys
+from hoz_dist.wire.protocol.messages import Accepted, Busy, GradientPush, ParametersHead, PushReply, Refused
+from hoz_dist.wire.transport.ask import ask
+from hoz_dist.wire.transport.session import open_client
 
 FRAMES: Final = 20
 ATTEMPT_S: Final = 20.0

@@ -15,9 +15,9 @@ from typing import Any, Final, Literal, NamedTuple
 
 import click
 
-from hoz_dist.wire.keys import Keys
-from hoz_dist.wire.liveliness import Members
-from hoz_dist.wire.session import open_client
+from hoz_dist.wire.membership.liveliness import Members
+from hoz_dist.wire.protocol.keys import Keys
+from hoz_dist.wire.transport.session import open_client
 from tests.campaigns.cluster import ROUTER, Cluster, prepare_views, start
 from tests.campaigns.faults import PAUSE_S, Fault, Kind, strike
 from tests.campaigns.helpers import pause, wait_until

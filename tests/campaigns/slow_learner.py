@@ -15,7 +15,7 @@ from typing import Any, Final
 
 import click
 
-from hoz_dist.wire.inbox import MOST_WAITING
+from hoz_dist.wire.serving.inbox import MOST_WAITING
 from learner.checkpoint import load_checkpoint
 from tests.campaigns.audit import audit
 from tests.campaigns.cluster import ROUTER, Cluster, start

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 from hoz_dist.closing import Closing
-from hoz_dist.wire.environment import child_environment
+from hoz_dist.wire.transport.environment import child_environment
 
 POLL_S: Final = 0.02
 STOP_S: Final = 30.0

@@ -11,7 +11,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from hoz_dist.wire.environment import child_environment
+from hoz_dist.wire.transport.environment import child_environment
 
 DEADLINE_S = 60.0
 SMALL_ROOMS = ("bathroom/7", "bathroom/10")

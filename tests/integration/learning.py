@@ -20,13 +20,14 @@ from hoz_dist.graph.room_graph import RoomGraph
 from hoz_dist.nav.categories import TARGETS
 from hoz_dist.nav.episode import EpisodeResult
 from hoz_dist.nav.rooms import RoomId
-from hoz_dist.wire.environment import child_environment
-from hoz_dist.wire.keys import Keys
-from hoz_dist.wire.liveliness import Member, declare_alive
-from hoz_dist.wire.messages import Accepted, EpisodesPush, GradientPush, Refused, RoomGraphPush
-from hoz_dist.wire.parameters import Parameters, ParametersFollower
-from hoz_dist.wire.push import Pusher
-from hoz_dist.wire.session import open_client
+from hoz_dist.wire.client.parameters import ParametersFollower
+from hoz_dist.wire.client.push import Pusher
+from hoz_dist.wire.membership.liveliness import Member, declare_alive
+from hoz_dist.wire.protocol.keys import Keys
+from hoz_dist.wire.protocol.messages import Accepted, EpisodesPush, GradientPush, Refused, RoomGraphPush
+from hoz_dist.wire.protocol.parameters import Parameters
+from hoz_dist.wire.transport.environment import child_environment
+from hoz_dist.wire.transport.session import open_client
 from learner.checkpoint import FOLDER, Stamp, checkpoint_files
 from learner.service import LearnerSettings, catalogue_digests, serve
 

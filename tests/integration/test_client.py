@@ -21,13 +21,13 @@ from hoz_dist.errors import ConnectionFailedError, HozError, InvalidValueError, 
 from hoz_dist.graph.files import load_graph
 from hoz_dist.graph.planner import plan_for
 from hoz_dist.nav.categories import TARGETS
-from hoz_dist.wire.discovery import find_run
-from hoz_dist.wire.keys import Keys
-from hoz_dist.wire.queryable import declare_queryable
-from hoz_dist.wire.server import Server
-from hoz_dist.wire.session import open_client, open_router
-from hoz_dist.wire.snapshots import Snapshots
-from hoz_dist.wire.waiting import StoppedError
+from hoz_dist.waiting import StoppedError
+from hoz_dist.wire.client.discovery import find_run
+from hoz_dist.wire.protocol.keys import Keys
+from hoz_dist.wire.serving.server import Server
+from hoz_dist.wire.serving.snapshots import Snapshots
+from hoz_dist.wire.transport.queryable import declare_queryable
+from hoz_dist.wire.transport.session import open_client, open_router
 from tests import wire_samples as samples
 
 pytestmark = pytest.mark.integration

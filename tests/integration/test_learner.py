@@ -16,9 +16,9 @@ from hoz_dist.client import HozClient
 from hoz_dist.graph.planner import plan_for
 from hoz_dist.graph.scene_graph import merge_rooms
 from hoz_dist.policy.parameters import initial_parameters
-from hoz_dist.wire.liveliness import host_name
-from hoz_dist.wire.messages import Accepted, GradientPush, Refused
-from hoz_dist.wire.rejection import Reason
+from hoz_dist.wire.membership.liveliness import host_name
+from hoz_dist.wire.protocol.messages import Accepted, GradientPush, Refused
+from hoz_dist.wire.protocol.rejection import Reason
 from learner.checkpoint import load_checkpoint
 from learner.core import LearnerCore
 from learner.events import GradientReceived

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from hoz_dist.wire.session import is_connected, open_client
+from hoz_dist.wire.transport.session import is_connected, open_client
 from tests.integration.commands import HozDist, hoz_dist, until
 
 pytestmark = pytest.mark.integration

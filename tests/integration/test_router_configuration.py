@@ -8,9 +8,9 @@ import pytest
 import zenoh
 
 from hoz_dist.cli.main import run
-from hoz_dist.wire.credentials import ROUTER_FILE, load_credentials
-from hoz_dist.wire.session import is_connected, open_client, open_configured_router
-from hoz_dist.wire.settings import router_settings
+from hoz_dist.wire.transport.credentials import ROUTER_FILE, load_credentials
+from hoz_dist.wire.transport.session import is_connected, open_client, open_configured_router
+from hoz_dist.wire.transport.settings import router_settings
 
 DEPLOYED = Path(__file__).parents[2] / "deploy" / "router" / "router.json5"
 

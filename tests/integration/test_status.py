@@ -14,11 +14,11 @@ import pytest
 
 from hoz_dist.cli.main import run
 from hoz_dist.client import HozClient
-from hoz_dist.wire.environment import child_environment
-from hoz_dist.wire.keys import Keys
-from hoz_dist.wire.liveliness import Member, Members, declare_alive
-from hoz_dist.wire.roster import MOST_LIVE
-from hoz_dist.wire.session import open_client, open_router
+from hoz_dist.wire.membership.liveliness import Member, Members, declare_alive
+from hoz_dist.wire.membership.roster import MOST_LIVE
+from hoz_dist.wire.protocol.keys import Keys
+from hoz_dist.wire.transport.environment import child_environment
+from hoz_dist.wire.transport.session import open_client, open_router
 from tests import wire_samples as samples
 from tests.integration.commands import HozDist, until
 from tests.integration.learning import FakeActor, LearnerProcess, running_learner, status_when

@@ -12,15 +12,15 @@ from typing import Final
 import zenoh
 
 from hoz_dist.security.key_folders import RouterPlace, create_authority, issue_keys, withdraw_key
-from hoz_dist.wire.ask import Answer, ask
-from hoz_dist.wire.codec import checksum, encode
-from hoz_dist.wire.credentials import ROUTER_FILE, Credentials, load_credentials
-from hoz_dist.wire.messages import Accepted, Push
-from hoz_dist.wire.parameters import ParametersPublisher
-from hoz_dist.wire.server import Server
-from hoz_dist.wire.session import Session, open_client, open_router
-from hoz_dist.wire.settings import CLIENT_LEASE_MS, client_settings, tls_settings
-from hoz_dist.wire.snapshots import Snapshots
+from hoz_dist.wire.protocol.codec import checksum, encode
+from hoz_dist.wire.protocol.messages import Accepted, Push
+from hoz_dist.wire.serving.parameters import ParametersPublisher
+from hoz_dist.wire.serving.server import Server
+from hoz_dist.wire.serving.snapshots import Snapshots
+from hoz_dist.wire.transport.ask import Answer, ask
+from hoz_dist.wire.transport.credentials import ROUTER_FILE, Credentials, load_credentials
+from hoz_dist.wire.transport.session import Session, open_client, open_router
+from hoz_dist.wire.transport.settings import CLIENT_LEASE_MS, client_settings, tls_settings
 from tests import wire_samples as samples
 from tests.integration.commands import HozDist, until
 from tests.integration.wire.pushing import answering

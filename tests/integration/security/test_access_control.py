@@ -16,11 +16,11 @@ import zenoh
 
 from hoz_dist.client import HozClient
 from hoz_dist.errors import ConnectionFailedError, NotFoundError
-from hoz_dist.wire.codec import encode
-from hoz_dist.wire.graphs import scene_graph_reply
-from hoz_dist.wire.liveliness import Member, Members, declare_alive
-from hoz_dist.wire.message import Message
-from hoz_dist.wire.messages import (
+from hoz_dist.wire.membership.liveliness import Member, Members, declare_alive
+from hoz_dist.wire.protocol.codec import encode
+from hoz_dist.wire.protocol.graphs import scene_graph_reply
+from hoz_dist.wire.protocol.message import Message
+from hoz_dist.wire.protocol.messages import (
     EpisodesPush,
     GradientPush,
     ParametersHead,
@@ -28,8 +28,8 @@ from hoz_dist.wire.messages import (
     RoomGraphPush,
     SceneGraphReply,
 )
-from hoz_dist.wire.publishing import NewestPublisher, NewestSubscriber
-from hoz_dist.wire.session import Session
+from hoz_dist.wire.transport.publishing import NewestPublisher, NewestSubscriber
+from hoz_dist.wire.transport.session import Session
 from tests import wire_samples as samples
 from tests.integration.security.network import KEYS, Network
 from tests.integration.wire.pushing import until

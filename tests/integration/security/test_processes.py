@@ -12,9 +12,9 @@ import pytest
 from hoz_dist.cli.main import run
 from hoz_dist.client import HozClient
 from hoz_dist.errors import ConnectionFailedError
-from hoz_dist.wire.credentials import load_credentials
-from hoz_dist.wire.messages import Accepted
-from hoz_dist.wire.session import open_client
+from hoz_dist.wire.protocol.messages import Accepted
+from hoz_dist.wire.transport.credentials import load_credentials
+from hoz_dist.wire.transport.session import open_client
 from tests.integration.commands import HozDist, hoz_dist, until
 from tests.integration.learning import CONFIG, graph_of
 from tests.integration.security.network import free_endpoint

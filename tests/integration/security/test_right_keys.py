@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from hoz_dist.client import HozClient
-from hoz_dist.wire.codec import decode
-from hoz_dist.wire.liveliness import Member, Members, declare_alive
-from hoz_dist.wire.messages import Accepted, EpisodesPush, GradientPush, Push, RoomGraphPush, SceneGraphReply
-from hoz_dist.wire.parameters import ParametersFollower
-from hoz_dist.wire.publishing import NewestSubscriber
+from hoz_dist.wire.client.parameters import ParametersFollower
+from hoz_dist.wire.membership.liveliness import Member, Members, declare_alive
+from hoz_dist.wire.protocol.codec import decode
+from hoz_dist.wire.protocol.messages import Accepted, EpisodesPush, GradientPush, Push, RoomGraphPush, SceneGraphReply
+from hoz_dist.wire.transport.publishing import NewestSubscriber
 from tests import wire_samples as samples
 from tests.integration.security.network import KEYS, Network
 from tests.integration.wire.pushing import until

@@ -14,7 +14,8 @@ import zenoh
 from hoz_dist.errors import ConnectionFailedError, InvalidValueError
 from hoz_dist.security.authority import Authority, KeyPair
 from hoz_dist.security.key_folders import AUTHORITY_KEY_FILE
-from hoz_dist.wire.credentials import (
+from hoz_dist.wire.protocol.messages import GradientPush
+from hoz_dist.wire.transport.credentials import (
     AUTHORITY_FILE,
     CERTIFICATE_FILE,
     KEY_FILE,
@@ -23,9 +24,8 @@ from hoz_dist.wire.credentials import (
     common_name,
     load_credentials,
 )
-from hoz_dist.wire.messages import GradientPush
-from hoz_dist.wire.session import is_connected, open_client, open_router
-from hoz_dist.wire.settings import CLIENT_LEASE_MS, client_settings
+from hoz_dist.wire.transport.session import is_connected, open_client, open_router
+from hoz_dist.wire.transport.settings import CLIENT_LEASE_MS, client_settings
 from tests import wire_samples as samples
 from tests.integration.security.network import DAY, KEYS, ROUTERS, Network, free_endpoint
 from tests.integration.wire.pushing import until

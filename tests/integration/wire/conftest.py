@@ -4,8 +4,8 @@ from collections.abc import Iterator
 
 import pytest
 
-from hoz_dist.wire.server import Server
-from hoz_dist.wire.session import Session, open_client
+from hoz_dist.wire.serving.server import Server
+from hoz_dist.wire.transport.session import Session, open_client
 from tests import wire_samples as samples
 
 

@@ -5,15 +5,15 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from hoz_dist.wire.ask import ask
-from hoz_dist.wire.codec import checksum, encode
-from hoz_dist.wire.inbox import Inbox, Request
-from hoz_dist.wire.messages import (
+from hoz_dist.wire.client.push import Pusher
+from hoz_dist.wire.protocol.codec import checksum, encode
+from hoz_dist.wire.protocol.messages import (
     Push,
     PushReply,
 )
-from hoz_dist.wire.push import Pusher
-from hoz_dist.wire.session import Session
+from hoz_dist.wire.serving.inbox import Inbox, Request
+from hoz_dist.wire.transport.ask import ask
+from hoz_dist.wire.transport.session import Session
 from tests import wire_samples as samples
 
 KEYS = samples.KEYS

@@ -13,17 +13,18 @@ import numpy as np
 import pytest
 
 from hoz_dist.errors import ConnectionFailedError
-from hoz_dist.wire.codec import decode
-from hoz_dist.wire.liveliness import Member, Members, declare_alive
-from hoz_dist.wire.messages import (
+from hoz_dist.wire.client.parameters import ParametersFollower
+from hoz_dist.wire.client.push import Pusher
+from hoz_dist.wire.membership.liveliness import Member, Members, declare_alive
+from hoz_dist.wire.protocol.codec import decode
+from hoz_dist.wire.protocol.messages import (
     Accepted,
     PushReply,
 )
-from hoz_dist.wire.parameters import ParametersFollower, ParametersPublisher
-from hoz_dist.wire.push import Pusher
-from hoz_dist.wire.server import Server
-from hoz_dist.wire.session import open_client, open_router
-from hoz_dist.wire.snapshots import Snapshots
+from hoz_dist.wire.serving.parameters import ParametersPublisher
+from hoz_dist.wire.serving.server import Server
+from hoz_dist.wire.serving.snapshots import Snapshots
+from hoz_dist.wire.transport.session import open_client, open_router
 from tests import wire_samples as samples
 from tests.integration.wire.pushing import GRADS, KEYS, WAIT_S, answering, encoded_gradient, raw_push, until
 
@@ -33,7 +34,7 @@ pytestmark = pytest.mark.integration
 _LEARNER = """
 import sys
 from tests import wire_samples as samples
-from hoz_dist.wire.messages import Accepted
+from hoz_dist.wire.protocol.messages import Accepted
 with samples.serving(sys.argv[1], epoch=int(sys.argv[2])) as (server, session):
     print("ready", flush=True)
     while True:

@@ -10,13 +10,13 @@ import pytest
 from hoz_dist.client import HozClient
 from hoz_dist.nav.categories import TARGETS
 from hoz_dist.nav.rooms import RoomId
-from hoz_dist.wire.ask import ask
-from hoz_dist.wire.codec import decode, encode
-from hoz_dist.wire.keys import Keys
-from hoz_dist.wire.messages import Accepted, EpisodesPush, GradientPush, Refused, RoomGraphPush
-from hoz_dist.wire.parameters import Parameters
-from hoz_dist.wire.rejection import Reason, RejectedError
-from hoz_dist.wire.session import Session, open_client
+from hoz_dist.wire.protocol.codec import decode, encode
+from hoz_dist.wire.protocol.keys import Keys
+from hoz_dist.wire.protocol.messages import Accepted, EpisodesPush, GradientPush, Refused, RoomGraphPush
+from hoz_dist.wire.protocol.parameters import Parameters
+from hoz_dist.wire.protocol.rejection import Reason, RejectedError
+from hoz_dist.wire.transport.ask import ask
+from hoz_dist.wire.transport.session import Session, open_client
 from tests import wire_samples as samples
 from tests.integration.learning import CONFIG, FakeActor, gradient_for, graph_of, running_learner, status_when
 from tests.integration.wire.pushing import raw_push

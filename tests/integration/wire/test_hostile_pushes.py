@@ -6,14 +6,14 @@ import pytest
 import zenoh
 
 from hoz_dist.nav.rooms import RoomId
-from hoz_dist.wire.ask import ask
-from hoz_dist.wire.codec import decode, encode
-from hoz_dist.wire.messages import (
+from hoz_dist.wire.protocol.codec import decode, encode
+from hoz_dist.wire.protocol.messages import (
     Accepted,
     Refused,
 )
-from hoz_dist.wire.server import Server
-from hoz_dist.wire.session import Session, open_client
+from hoz_dist.wire.serving.server import Server
+from hoz_dist.wire.transport.ask import ask
+from hoz_dist.wire.transport.session import Session, open_client
 from tests import wire_samples as samples
 from tests.integration.wire.pushing import GRADS, KEYS, WAIT_S, answering, encoded_gradient, push_to, raw_push
 

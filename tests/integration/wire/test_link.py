@@ -14,14 +14,14 @@ import pytest
 from hoz_dist.config import RunConfig
 from hoz_dist.errors import HozError
 from hoz_dist.nav.categories import TARGETS
-from hoz_dist.wire import epochs
-from hoz_dist.wire.epochs import AnotherRunError
-from hoz_dist.wire.messages import Accepted, ConfigReply, Push, PushReply, Refused
-from hoz_dist.wire.parameters import ParametersPublisher
-from hoz_dist.wire.server import Server
-from hoz_dist.wire.session import Session, open_client, open_router
-from hoz_dist.wire.snapshots import Snapshots
-from hoz_dist.wire.waiting import StoppedError
+from hoz_dist.waiting import StoppedError
+from hoz_dist.wire.client import epochs
+from hoz_dist.wire.client.epochs import AnotherRunError
+from hoz_dist.wire.protocol.messages import Accepted, ConfigReply, Push, PushReply, Refused
+from hoz_dist.wire.serving.parameters import ParametersPublisher
+from hoz_dist.wire.serving.server import Server
+from hoz_dist.wire.serving.snapshots import Snapshots
+from hoz_dist.wire.transport.session import Session, open_client, open_router
 from tests import wire_samples as samples
 from tests.integration.wire.pushing import KEYS, WAIT_S, answering, until
 from workers import link as link_module

@@ -9,15 +9,15 @@ import pytest
 import zenoh
 
 from hoz_dist.client import HozClient
-from hoz_dist.wire.codec import decode, encode
-from hoz_dist.wire.discovery import find_run
-from hoz_dist.wire.messages import Refused
-from hoz_dist.wire.parameters import ParametersFollower
-from hoz_dist.wire.push import Pusher
-from hoz_dist.wire.queryable import declare_queryable
-from hoz_dist.wire.rejection import OtherVersionError
-from hoz_dist.wire.server import Server
-from hoz_dist.wire.session import Session, open_client, open_router
+from hoz_dist.wire.client.discovery import find_run
+from hoz_dist.wire.client.parameters import ParametersFollower
+from hoz_dist.wire.client.push import Pusher
+from hoz_dist.wire.protocol.codec import decode, encode
+from hoz_dist.wire.protocol.messages import Refused
+from hoz_dist.wire.protocol.rejection import OtherVersionError
+from hoz_dist.wire.serving.server import Server
+from hoz_dist.wire.transport.queryable import declare_queryable
+from hoz_dist.wire.transport.session import Session, open_client, open_router
 from tests import wire_samples as samples
 from tests.integration.wire.pushing import GRADS, KEYS, WAIT_S, raw_push
 

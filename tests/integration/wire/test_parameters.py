@@ -6,20 +6,21 @@ import numpy as np
 import pytest
 
 from hoz_dist.errors import ConnectionFailedError
-from hoz_dist.wire.ask import ask
-from hoz_dist.wire.codec import decode
-from hoz_dist.wire.epochs import AnotherRunError
-from hoz_dist.wire.liveliness import Members
-from hoz_dist.wire.message import SHARD_ELEMENTS
-from hoz_dist.wire.messages import (
+from hoz_dist.wire.client.epochs import AnotherRunError
+from hoz_dist.wire.client.parameters import ParametersFollower
+from hoz_dist.wire.membership.liveliness import Members
+from hoz_dist.wire.protocol.codec import decode
+from hoz_dist.wire.protocol.message import SHARD_ELEMENTS
+from hoz_dist.wire.protocol.messages import (
     ParametersHead,
     SceneGraphReply,
 )
-from hoz_dist.wire.parameters import ParametersFollower, ParametersPublisher
-from hoz_dist.wire.publishing import NewestSubscriber
-from hoz_dist.wire.server import Server
-from hoz_dist.wire.session import Session, open_client, open_router
-from hoz_dist.wire.snapshots import Snapshots
+from hoz_dist.wire.serving.parameters import ParametersPublisher
+from hoz_dist.wire.serving.server import Server
+from hoz_dist.wire.serving.snapshots import Snapshots
+from hoz_dist.wire.transport.ask import ask
+from hoz_dist.wire.transport.publishing import NewestSubscriber
+from hoz_dist.wire.transport.session import Session, open_client, open_router
 from tests import wire_samples as samples
 from tests.integration.wire.pushing import KEYS, WAIT_S, until
 

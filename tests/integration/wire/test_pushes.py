@@ -7,19 +7,19 @@ from collections.abc import Iterator
 import pytest
 
 from hoz_dist.errors import ConnectionFailedError
-from hoz_dist.wire.codec import decode, encode
-from hoz_dist.wire.inbox import Inbox
-from hoz_dist.wire.messages import (
+from hoz_dist.waiting import StoppedError
+from hoz_dist.wire.client.push import Pusher
+from hoz_dist.wire.protocol.codec import decode, encode
+from hoz_dist.wire.protocol.messages import (
     Accepted,
     Busy,
     PushReply,
     Refused,
 )
-from hoz_dist.wire.push import Pusher
-from hoz_dist.wire.rejection import Reason
-from hoz_dist.wire.server import Server
-from hoz_dist.wire.session import Session, open_client
-from hoz_dist.wire.waiting import StoppedError
+from hoz_dist.wire.protocol.rejection import Reason
+from hoz_dist.wire.serving.inbox import Inbox
+from hoz_dist.wire.serving.server import Server
+from hoz_dist.wire.transport.session import Session, open_client
 from tests import wire_samples as samples
 from tests.integration.wire.pushing import GRADS, WAIT_S, answering, encoded_gradient, push_to, raw_push, taken, until
 

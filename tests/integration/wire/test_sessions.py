@@ -13,11 +13,11 @@ import pytest
 import zenoh
 
 from hoz_dist.errors import ConnectionFailedError, DamagedFileError, HozError, InvalidValueError, NotFoundError
-from hoz_dist.wire.credentials import Credentials
-from hoz_dist.wire.server import Server
-from hoz_dist.wire.session import is_connected, open_client, open_configured_router, open_router
-from hoz_dist.wire.settings import SERVICE_LEASE_MS
-from hoz_dist.wire.waiting import StoppedError
+from hoz_dist.waiting import StoppedError
+from hoz_dist.wire.serving.server import Server
+from hoz_dist.wire.transport.credentials import Credentials
+from hoz_dist.wire.transport.session import is_connected, open_client, open_configured_router, open_router
+from hoz_dist.wire.transport.settings import SERVICE_LEASE_MS
 from tests import wire_samples as samples
 from tests.integration.commands import HozDist
 from tests.integration.wire.pushing import WAIT_S, until
@@ -97,7 +97,7 @@ def test_a_router_that_stands_still_is_noticed_within_its_lease(endpoint: str, t
 
 _STALLED = """
 import sys
-from hoz_dist.wire.session import open_client
+from hoz_dist.wire.transport.session import open_client
 with open_client(sys.argv[1]) as session:
     replies = session.get("big")
     print("asked", flush=True)

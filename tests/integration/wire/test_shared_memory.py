@@ -13,15 +13,16 @@ import pytest
 from zenoh import Query
 from zenoh.handlers import FifoChannel
 
-from hoz_dist.wire import shared_memory
-from hoz_dist.wire.draining import Drain
-from hoz_dist.wire.messages import Accepted, GradientPush
-from hoz_dist.wire.parameters import ParametersFollower, ParametersPublisher
-from hoz_dist.wire.push import Pusher
-from hoz_dist.wire.server import Server
-from hoz_dist.wire.session import Session, open_client, open_router
-from hoz_dist.wire.shared_memory import LEAST_BYTES, SharedMemory
-from hoz_dist.wire.snapshots import Snapshots
+from hoz_dist.wire.client.parameters import ParametersFollower
+from hoz_dist.wire.client.push import Pusher
+from hoz_dist.wire.protocol.messages import Accepted, GradientPush
+from hoz_dist.wire.serving.parameters import ParametersPublisher
+from hoz_dist.wire.serving.server import Server
+from hoz_dist.wire.serving.snapshots import Snapshots
+from hoz_dist.wire.transport import shared_memory
+from hoz_dist.wire.transport.draining import Drain
+from hoz_dist.wire.transport.session import Session, open_client, open_router
+from hoz_dist.wire.transport.shared_memory import LEAST_BYTES, SharedMemory
 from tests import wire_samples as samples
 from tests.integration.commands import until
 from tests.integration.wire.pushing import GRADS, KEYS, answering
@@ -138,7 +139,7 @@ def test_threads_may_share_one(memory: SharedMemory) -> None:
 HOLDER = f"""
 import sys, time
 from zenoh.handlers import FifoChannel
-from hoz_dist.wire.session import open_client
+from hoz_dist.wire.transport.session import open_client
 with open_client(sys.argv[1], 10.0, shared_memory=True) as session:
     reply = session.get("{KEY}", FifoChannel(4), timeout=10.0).recv()
     print("shared" if reply.ok.payload.as_shm() is not None else "plain", flush=True)

@@ -13,10 +13,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hoz_dist.wire.environment import child_environment
-from hoz_dist.wire.message import SHARD_ELEMENTS
-from hoz_dist.wire.parameters import Parameters, ParametersFollower, ParametersPublisher
-from hoz_dist.wire.session import open_client, open_router
+from hoz_dist.wire.client.parameters import ParametersFollower
+from hoz_dist.wire.protocol.message import SHARD_ELEMENTS
+from hoz_dist.wire.protocol.parameters import Parameters
+from hoz_dist.wire.serving.parameters import ParametersPublisher
+from hoz_dist.wire.transport.environment import child_environment
+from hoz_dist.wire.transport.session import open_client, open_router
 from tests.integration.commands import HozDist
 from tests.integration.wire.pushing import KEYS, until
 from tests.integration.wire.slow_link import SlowLink
@@ -92,8 +94,8 @@ def test_a_reader_behind_a_slow_link_gets_a_whole_version_and_holds_up_nobody(
 
 _READER = """
 import sys, threading
-from hoz_dist.wire.parameters import ParametersFollower
-from hoz_dist.wire.session import open_client
+from hoz_dist.wire.client.parameters import ParametersFollower
+from hoz_dist.wire.transport.session import open_client
 from tests.integration.wire.pushing import KEYS
 with open_client(sys.argv[1]) as session, ParametersFollower(session, KEYS, threading.Event()) as follower:
     while True:

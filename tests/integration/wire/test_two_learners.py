@@ -11,15 +11,16 @@ import pytest
 
 from hoz_dist.client import HozClient
 from hoz_dist.errors import ConnectionFailedError
-from hoz_dist.wire.ask import STRAGGLERS_S
-from hoz_dist.wire.discovery import find_run, find_runs
-from hoz_dist.wire.epochs import Epochs
-from hoz_dist.wire.messages import Accepted, GradientPush, Push, PushReply, Refused
-from hoz_dist.wire.parameters import ParametersFollower, ParametersPublisher
-from hoz_dist.wire.push import Pusher
-from hoz_dist.wire.server import Server
-from hoz_dist.wire.session import Session, open_client, open_router
-from hoz_dist.wire.snapshots import Snapshots
+from hoz_dist.wire.client.discovery import find_run, find_runs
+from hoz_dist.wire.client.epochs import Epochs
+from hoz_dist.wire.client.parameters import ParametersFollower
+from hoz_dist.wire.client.push import Pusher
+from hoz_dist.wire.protocol.messages import Accepted, GradientPush, Push, PushReply, Refused
+from hoz_dist.wire.serving.parameters import ParametersPublisher
+from hoz_dist.wire.serving.server import Server
+from hoz_dist.wire.serving.snapshots import Snapshots
+from hoz_dist.wire.transport.ask import STRAGGLERS_S
+from hoz_dist.wire.transport.session import Session, open_client, open_router
 from tests import wire_samples as samples
 from tests.integration.wire.pushing import GRADS, KEYS, WAIT_S, answering, push_to
 

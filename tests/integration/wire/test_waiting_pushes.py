@@ -7,12 +7,12 @@ from contextlib import ExitStack
 
 import pytest
 
-from hoz_dist.wire.codec import decode
-from hoz_dist.wire.inbox import MOST_WAITING, Inbox
-from hoz_dist.wire.messages import Accepted, Busy, PushReply
-from hoz_dist.wire.push import Pusher
-from hoz_dist.wire.server import Server
-from hoz_dist.wire.session import Session, open_client
+from hoz_dist.wire.client.push import Pusher
+from hoz_dist.wire.protocol.codec import decode
+from hoz_dist.wire.protocol.messages import Accepted, Busy, PushReply
+from hoz_dist.wire.serving.inbox import MOST_WAITING, Inbox
+from hoz_dist.wire.serving.server import Server
+from hoz_dist.wire.transport.session import Session, open_client
 from tests import wire_samples as samples
 from tests.integration.wire.pushing import GRADS, KEYS, WAIT_S, encoded_gradient, push_to, raw_push, taken, until
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from hoz_dist.cli.main import run
-from hoz_dist.wire.credentials import load_credentials
+from hoz_dist.wire.transport.credentials import load_credentials
 
 
 @pytest.fixture

@@ -11,7 +11,7 @@ import click
 import yaml
 
 from hoz_dist.cli.main import cli
-from hoz_dist.wire.environment import child_environment
+from hoz_dist.wire.transport.environment import child_environment
 
 ROOT = Path(__file__).parents[3]
 DEPLOY = ROOT / "deploy"

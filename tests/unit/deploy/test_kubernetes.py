@@ -12,7 +12,7 @@ import yaml
 
 from hoz_dist import __version__
 from hoz_dist.cli.main import run
-from hoz_dist.wire.credentials import load_credentials
+from hoz_dist.wire.transport.credentials import load_credentials
 from tests.unit.deploy.reading import DEPLOY, commands_in, compose_file, filled_in, parse
 
 KUBECTL = shutil.which("kubectl") or ""

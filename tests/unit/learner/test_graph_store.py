@@ -5,7 +5,7 @@ import pytest
 
 from hoz_dist.graph.room_graph import RoomGraph
 from hoz_dist.graph.scene_graph import merge_rooms
-from hoz_dist.wire.rejection import Reason, RejectedError
+from hoz_dist.wire.protocol.rejection import Reason, RejectedError
 from learner.graph_store import GraphStore
 from tests.unit.learner.making import ZONES, room_graph
 

@@ -12,7 +12,7 @@ import pytest
 from hoz_dist.errors import InvalidValueError, NotFoundError, UnknownNameError
 from hoz_dist.security.key_folders import RouterPlace, create_authority, issue_keys, withdraw_key
 from hoz_dist.security.register import Register
-from hoz_dist.wire.credentials import ROUTER_FILE, load_credentials
+from hoz_dist.wire.transport.credentials import ROUTER_FILE, load_credentials
 
 DAY = timedelta(days=1)
 

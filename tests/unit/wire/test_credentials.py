@@ -7,7 +7,7 @@ import pytest
 from hoz_dist.errors import DamagedFileError, InvalidValueError, NotFoundError
 from hoz_dist.security.authority import Authority
 from hoz_dist.security.key_folders import create_authority, issue_keys
-from hoz_dist.wire.credentials import AUTHORITY_FILE, CERTIFICATE_FILE, KEY_FILE, load_credentials
+from hoz_dist.wire.transport.credentials import AUTHORITY_FILE, CERTIFICATE_FILE, KEY_FILE, load_credentials
 
 DAY = timedelta(days=1)
 

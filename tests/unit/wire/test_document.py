@@ -6,16 +6,16 @@ from pathlib import Path
 import pytest
 
 from hoz_dist.nav.rooms import RoomId
-from hoz_dist.wire.codec import MESSAGES, PROTOCOL_VERSION, checksum, decode, encode
-from hoz_dist.wire.epochs import ANOTHER_RUN_S
-from hoz_dist.wire.inbox import LONGEST_WAIT_S, MOST_WAITING, MOST_WAITING_BYTES
-from hoz_dist.wire.keys import Keys
-from hoz_dist.wire.message import SHARD_ELEMENTS, SMALL_BYTES, Message
-from hoz_dist.wire.messages import ParametersHead, ParametersShard
-from hoz_dist.wire.rejection import Reason
-from hoz_dist.wire.rejections import LOG_EVERY_S, MOST_LINES
-from hoz_dist.wire.versions import EXPIRES_S, MOST_BYTES, MOST_READERS
-from hoz_dist.wire.waiting import FIRST_TRY_S, LONGER_TRIES
+from hoz_dist.waiting import FIRST_TRY_S, LONGER_TRIES
+from hoz_dist.wire.client.epochs import ANOTHER_RUN_S
+from hoz_dist.wire.protocol.codec import MESSAGES, PROTOCOL_VERSION, checksum, decode, encode
+from hoz_dist.wire.protocol.keys import Keys
+from hoz_dist.wire.protocol.message import SHARD_ELEMENTS, SMALL_BYTES, Message
+from hoz_dist.wire.protocol.messages import ParametersHead, ParametersShard
+from hoz_dist.wire.protocol.rejection import Reason
+from hoz_dist.wire.protocol.rejections import LOG_EVERY_S, MOST_LINES
+from hoz_dist.wire.serving.inbox import LONGEST_WAIT_S, MOST_WAITING, MOST_WAITING_BYTES
+from hoz_dist.wire.serving.versions import EXPIRES_S, MOST_BYTES, MOST_READERS
 from learner.deduplication import MAX_SENDERS, WINDOW
 from tests.wire_examples import EXAMPLES
 

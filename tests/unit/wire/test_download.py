@@ -1,11 +1,11 @@
 import numpy as np
 import pytest
 
-from hoz_dist.wire.download import Download
-from hoz_dist.wire.message import SHARD_ELEMENTS
-from hoz_dist.wire.messages import ParametersHead, ParametersShard
-from hoz_dist.wire.parameters import head_of
-from hoz_dist.wire.rejection import Reason, RejectedError
+from hoz_dist.wire.client.download import Download
+from hoz_dist.wire.protocol.message import SHARD_ELEMENTS
+from hoz_dist.wire.protocol.messages import ParametersHead, ParametersShard
+from hoz_dist.wire.protocol.parameters import head_of
+from hoz_dist.wire.protocol.rejection import Reason, RejectedError
 
 VECTOR = np.arange(2 * SHARD_ELEMENTS + 5, dtype=np.float32)
 HEAD = head_of(1, 7, VECTOR)

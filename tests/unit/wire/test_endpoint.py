@@ -1,7 +1,7 @@
 import pytest
 
 from hoz_dist.errors import InvalidValueError
-from hoz_dist.wire.endpoint import DEFAULT_ENDPOINT, check_endpoint
+from hoz_dist.wire.transport.endpoint import DEFAULT_ENDPOINT, check_endpoint
 
 
 @pytest.mark.parametrize(

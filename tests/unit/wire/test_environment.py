@@ -1,6 +1,6 @@
 import pytest
 
-from hoz_dist.wire.environment import child_environment
+from hoz_dist.wire.transport.environment import child_environment
 
 
 def test_children_get_the_settings_and_all_that_the_user_has_set(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hoz_dist.wire.codec import MESSAGES, decode, encode
-from hoz_dist.wire.message import Message
-from hoz_dist.wire.messages import Refused
-from hoz_dist.wire.rejection import Reason, RejectedError
+from hoz_dist.wire.protocol.codec import MESSAGES, decode, encode
+from hoz_dist.wire.protocol.message import Message
+from hoz_dist.wire.protocol.messages import Refused
+from hoz_dist.wire.protocol.rejection import Reason, RejectedError
 from tests import wire_samples as samples
 from tests.mutations import MUTATIONS, Mutation, encoded, mutated
 

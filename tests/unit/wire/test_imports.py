@@ -11,7 +11,10 @@ import pytest
     [
         ("hoz_dist.client, hoz_dist.cli.query, hoz_dist.cli.status", "torch pybullet gymnasium sklearn scipy rich"),
         ("hoz_dist.cli.query, hoz_dist.cli.status", "zenoh numpy msgpack"),
-        ("hoz_dist.wire.environment, hoz_dist.wire.endpoint, hoz_dist.wire.keys", "zenoh numpy msgpack"),
+        (
+            "hoz_dist.wire.transport.environment, hoz_dist.wire.transport.endpoint, hoz_dist.wire.protocol.keys",
+            "zenoh numpy msgpack",
+        ),
     ],
 )
 def test_modules_start_without(modules: str, forbidden: str) -> None:

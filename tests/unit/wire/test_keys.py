@@ -3,7 +3,7 @@ import zenoh
 
 from hoz_dist.errors import InvalidValueError
 from hoz_dist.nav.rooms import RoomId
-from hoz_dist.wire.keys import ALL_CONFIGS, NAME_PATTERN, NOBODY, Keys, check_name, sender_of
+from hoz_dist.wire.protocol.keys import ALL_CONFIGS, NAME_PATTERN, NOBODY, Keys, check_name, sender_of
 
 
 def test_the_keys_are_those_of_the_protocol() -> None:

@@ -2,7 +2,7 @@ import logging
 
 import pytest
 
-from hoz_dist.wire.outage import Outage
+from hoz_dist.outage import Outage
 
 
 def test_an_outage_is_said_once_and_its_end_once(caplog: pytest.LogCaptureFixture) -> None:

@@ -2,8 +2,8 @@ import logging
 
 import pytest
 
-from hoz_dist.wire.rejection import Reason
-from hoz_dist.wire.rejections import MOST_SENDERS, OTHER_SENDERS, Rejections
+from hoz_dist.wire.protocol.rejection import Reason
+from hoz_dist.wire.protocol.rejections import MOST_SENDERS, OTHER_SENDERS, Rejections
 
 
 def test_rejections_are_counted_by_reason_and_by_sender() -> None:

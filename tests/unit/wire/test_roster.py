@@ -1,6 +1,6 @@
 """Who is listed as live and as left, whatever the order in which tokens come and go."""
 
-from hoz_dist.wire.roster import MOST_LEFT, MOST_LIVE, MOST_OF_NAME, Member, Roster
+from hoz_dist.wire.membership.roster import MOST_LEFT, MOST_LIVE, MOST_OF_NAME, Member, Roster
 
 ANNA = Member("actor", "anna", "h1", 1)
 AGAIN = Member("actor", "anna", "h2", 2)

@@ -2,8 +2,8 @@ import pytest
 
 from hoz_dist.errors import InvalidValueError, NotFoundError, UnknownNameError
 from hoz_dist.graph.planner import plan_for
-from hoz_dist.wire.graphs import plan_of, room_graph_reply, scene_graph_reply
-from hoz_dist.wire.snapshots import Snapshots
+from hoz_dist.wire.protocol.graphs import plan_of, room_graph_reply, scene_graph_reply
+from hoz_dist.wire.serving.snapshots import Snapshots
 from tests import wire_samples as samples
 
 

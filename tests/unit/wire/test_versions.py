@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from hoz_dist.wire.parameters import Parameters, head_of
-from hoz_dist.wire.versions import EXPIRES_S, YIELDS_S, Versions
+from hoz_dist.wire.protocol.parameters import Parameters, head_of
+from hoz_dist.wire.serving.versions import EXPIRES_S, YIELDS_S, Versions
 
 SIZE = 1000
 BYTES = 4 * SIZE

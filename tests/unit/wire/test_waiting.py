@@ -3,7 +3,7 @@ import time
 
 import pytest
 
-from hoz_dist.wire.waiting import LONGEST_PAUSE_S, Backoff, Deadline, Patience, StoppedError
+from hoz_dist.waiting import LONGEST_PAUSE_S, Backoff, Deadline, Patience, StoppedError
 
 
 class Recorder(threading.Event):

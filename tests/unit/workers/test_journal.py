@@ -5,7 +5,7 @@ import pytest
 
 from hoz_dist.errors import InvalidValueError
 from hoz_dist.nav.categories import TARGETS
-from hoz_dist.wire.messages import Accepted, EpisodesPush, RoomGraphPush
+from hoz_dist.wire.protocol.messages import Accepted, EpisodesPush, RoomGraphPush
 from tests import wire_samples as samples
 from workers.journal import Journal
 

@@ -5,7 +5,7 @@ import pytest
 from hoz_dist.nav.rooms import RoomId, rooms_of
 from hoz_dist.policy.encoders import load_encoder
 from hoz_dist.sim.view_store import ViewStore
-from hoz_dist.wire.waiting import StoppedError
+from hoz_dist.waiting import StoppedError
 from workers.preparation import RoomPreparation
 
 ROOM = RoomId("bathroom", 9)

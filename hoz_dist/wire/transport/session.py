@@ -15,19 +15,19 @@ import zenoh
 from zenoh import Session
 
 from hoz_dist.errors import ConnectionFailedError, DamagedFileError, InvalidValueError, NotFoundError
-from hoz_dist.wire.endpoint import check_endpoint, is_encrypted
-from hoz_dist.wire.settings import (
+from hoz_dist.waiting import Deadline, StoppedError
+from hoz_dist.wire.transport.endpoint import check_endpoint, is_encrypted
+from hoz_dist.wire.transport.settings import (
     CLIENT_LEASE_MS,
     client_settings,
     router_settings,
     shared_memory_settings,
     tls_settings,
 )
-from hoz_dist.wire.waiting import Deadline, StoppedError
 
 if TYPE_CHECKING:
     # Reading certificates takes a tenth of a second to import, which only who has some needs to wait for.
-    from hoz_dist.wire.credentials import Credentials
+    from hoz_dist.wire.transport.credentials import Credentials
 
 __all__ = ["Session", "is_connected", "open_client", "open_configured_router", "open_router"]
 

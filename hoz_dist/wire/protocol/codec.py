@@ -11,8 +11,8 @@ from typing import Final, TypeVar
 import msgpack
 import xxhash
 
-from hoz_dist.wire.message import Message
-from hoz_dist.wire.messages import (
+from hoz_dist.wire.protocol.message import Message
+from hoz_dist.wire.protocol.messages import (
     Accepted,
     Busy,
     ConfigReply,
@@ -27,8 +27,8 @@ from hoz_dist.wire.messages import (
     SceneGraphReply,
     StatusReply,
 )
-from hoz_dist.wire.rejection import OtherVersionError, Reason, RejectedError
-from hoz_dist.wire.schema import MOST_CHARACTERS, MOST_ELEMENTS
+from hoz_dist.wire.protocol.rejection import OtherVersionError, Reason, RejectedError
+from hoz_dist.wire.protocol.schema import MOST_CHARACTERS, MOST_ELEMENTS
 
 PROTOCOL_VERSION: Final = 1
 MESSAGES: Final[dict[str, type[Message]]] = {

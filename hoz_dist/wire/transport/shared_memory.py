@@ -18,7 +18,7 @@ from zenoh import ZBytes
 from zenoh.shm import GarbageCollect, ShmProvider
 
 from hoz_dist.closing import Closing
-from hoz_dist.wire.outage import Outage
+from hoz_dist.outage import Outage
 
 _log = logging.getLogger(__name__)
 LEAST_BYTES: Final = 128 * 1024

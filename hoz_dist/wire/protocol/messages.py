@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from hoz_dist.graph.checks import MAX_ZONES
 from hoz_dist.nav.episode import EpisodeResult
 from hoz_dist.nav.rooms import RoomId
-from hoz_dist.wire.message import (
+from hoz_dist.wire.protocol.message import (
     CATEGORIES,
     DIGEST,
     EDGES,
@@ -36,8 +36,8 @@ from hoz_dist.wire.message import (
     Served,
     check_graph,
 )
-from hoz_dist.wire.rejection import LONGEST_DETAIL, Reason, RejectedError
-from hoz_dist.wire.schema import Counts, Int, JsonObject, Many, OneOf, Real, Record, Structure, Tensor, Text
+from hoz_dist.wire.protocol.rejection import LONGEST_DETAIL, Reason, RejectedError
+from hoz_dist.wire.protocol.schema import Counts, Int, JsonObject, Many, OneOf, Real, Record, Structure, Tensor, Text
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,7 +15,7 @@ from typing import Annotated, Any, ClassVar, Final, Protocol, get_args, get_orig
 import numpy as np
 from numpy.typing import NDArray
 
-from hoz_dist.wire.rejection import CONTROL, Reason, RejectedError
+from hoz_dist.wire.protocol.rejection import CONTROL, Reason, RejectedError
 
 MAX_INT: Final = 2**63 - 1
 MOST_ELEMENTS: Final = 4096

@@ -6,8 +6,8 @@ from hoz_dist.errors import UnknownNameError
 from hoz_dist.nav.categories import TARGETS
 from hoz_dist.nav.episode import EpisodeResult
 from hoz_dist.nav.rooms import RoomId
-from hoz_dist.wire.rejection import Reason, RejectedError
-from hoz_dist.wire.schema import Bool, Int, Spec, Text
+from hoz_dist.wire.protocol.rejection import Reason, RejectedError
+from hoz_dist.wire.protocol.schema import Bool, Int, Spec, Text
 
 
 class RoomName:

@@ -9,12 +9,12 @@ from zenoh import Query, Session
 from zenoh.handlers import FifoChannel
 
 from hoz_dist.errors import HozError, NotFoundError, UnknownNameError
-from hoz_dist.wire.codec import encode
-from hoz_dist.wire.draining import Drain
-from hoz_dist.wire.message import Message
-from hoz_dist.wire.messages import Busy, Refused
-from hoz_dist.wire.rejection import Reason, RejectedError, plain
-from hoz_dist.wire.shared_memory import SharedMemory
+from hoz_dist.wire.protocol.codec import encode
+from hoz_dist.wire.protocol.message import Message
+from hoz_dist.wire.protocol.messages import Busy, Refused
+from hoz_dist.wire.protocol.rejection import Reason, RejectedError, plain
+from hoz_dist.wire.transport.draining import Drain
+from hoz_dist.wire.transport.shared_memory import SharedMemory
 
 _CHANNEL: Final = 16
 """Queries that Zenoh holds while the thread is busy with the one before; more of them block the sender's transport."""

@@ -11,10 +11,10 @@ from zenoh import LivelinessToken, Session
 from zenoh.handlers import FifoChannel
 
 from hoz_dist.closing import Closing
-from hoz_dist.wire.draining import Drain
-from hoz_dist.wire.keys import NAME_PATTERN, Keys, check_name
-from hoz_dist.wire.roster import MOST_LIVE, Departure, Member, Roster
-from hoz_dist.wire.schema import MAX_INT
+from hoz_dist.wire.membership.roster import MOST_LIVE, Departure, Member, Roster
+from hoz_dist.wire.protocol.keys import NAME_PATTERN, Keys, check_name
+from hoz_dist.wire.protocol.schema import MAX_INT
+from hoz_dist.wire.transport.draining import Drain
 
 __all__ = ["Departure", "Member", "Members", "declare_alive", "host_name"]
 

@@ -29,8 +29,3 @@ class Outage:
         if self._lasts:
             self._log.info(self._back)
         self._lasts = False
-
-
-def learner_outage(log: logging.Logger) -> Outage:
-    """Return the outage of a learner that is asked."""
-    return Outage(log, "the learner does not answer; trying again", "the learner answers again")

@@ -8,14 +8,14 @@ import threading
 from collections.abc import Callable
 
 from hoz_dist.errors import ConnectionFailedError
-from hoz_dist.wire.asking import Asking
-from hoz_dist.wire.codec import checksum, encode
-from hoz_dist.wire.epochs import Epochs
-from hoz_dist.wire.messages import Accepted, Busy, GradientPush, Push, Refused
-from hoz_dist.wire.rejection import Reason
-from hoz_dist.wire.session import Session
-from hoz_dist.wire.shared_memory import SharedMemory
-from hoz_dist.wire.waiting import FIRST_TRY_S, Backoff, Deadline
+from hoz_dist.waiting import FIRST_TRY_S, Backoff, Deadline
+from hoz_dist.wire.client.asking import Asking
+from hoz_dist.wire.client.epochs import Epochs
+from hoz_dist.wire.protocol.codec import checksum, encode
+from hoz_dist.wire.protocol.messages import Accepted, Busy, GradientPush, Push, Refused
+from hoz_dist.wire.protocol.rejection import Reason
+from hoz_dist.wire.transport.session import Session
+from hoz_dist.wire.transport.shared_memory import SharedMemory
 
 
 class Pusher:

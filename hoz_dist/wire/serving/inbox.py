@@ -12,10 +12,10 @@ from typing import Final
 import zenoh
 
 from hoz_dist.closing import Closing
-from hoz_dist.wire.messages import Busy, Push, PushReply, Refused
-from hoz_dist.wire.queryable import answer
-from hoz_dist.wire.rejection import Reason
-from hoz_dist.wire.rejections import Rejections
+from hoz_dist.wire.protocol.messages import Busy, Push, PushReply, Refused
+from hoz_dist.wire.protocol.rejection import Reason
+from hoz_dist.wire.protocol.rejections import Rejections
+from hoz_dist.wire.transport.queryable import answer
 
 MOST_WAITING: Final = 32
 """The default of `RunConfig.max_lag`: a gradient that waits behind more than that is stale when its turn comes."""

@@ -4,10 +4,7 @@ import threading
 from collections import OrderedDict
 from typing import Final, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
-from hoz_dist.wire.messages import ParametersHead
+from hoz_dist.wire.protocol.parameters import Parameters
 
 MOST_READERS: Final = 1024
 MOST_BYTES: Final = 512 * 1024 * 1024
@@ -16,14 +13,6 @@ EXPIRES_S: Final = 120.0
 """Time after which a reader that asked for nothing more is forgotten; longer than a slow link takes for a shard."""
 YIELDS_S: Final = 5.0
 """Time after which such a reader makes room for another one when there is none."""
-
-
-class Parameters(NamedTuple):
-    """A version of the parameters."""
-
-    head: ParametersHead
-    vector: NDArray[np.float32]
-    """[P], read-only."""
 
 
 class _Reading(NamedTuple):

@@ -4,10 +4,10 @@ import numpy as np
 import xxhash
 from numpy.typing import NDArray
 
-from hoz_dist.wire.message import SHARD_ELEMENTS
-from hoz_dist.wire.messages import ParametersHead, ParametersShard
-from hoz_dist.wire.rejection import Reason, RejectedError
-from hoz_dist.wire.versions import Parameters
+from hoz_dist.wire.protocol.message import SHARD_ELEMENTS
+from hoz_dist.wire.protocol.messages import ParametersHead, ParametersShard
+from hoz_dist.wire.protocol.parameters import Parameters
+from hoz_dist.wire.protocol.rejection import Reason, RejectedError
 
 
 class Download:

@@ -7,12 +7,12 @@ from typing import TypeVar
 
 from zenoh import Session, ZBytes
 
-from hoz_dist.wire.ask import ask, messages_in
-from hoz_dist.wire.epochs import Epochs
-from hoz_dist.wire.message import Message
-from hoz_dist.wire.outage import learner_outage
-from hoz_dist.wire.rejection import OtherVersionError, RejectedError
-from hoz_dist.wire.waiting import FIRST_TRY_S, Deadline, Patience
+from hoz_dist.outage import Outage
+from hoz_dist.waiting import FIRST_TRY_S, Deadline, Patience
+from hoz_dist.wire.client.epochs import Epochs
+from hoz_dist.wire.protocol.message import Message
+from hoz_dist.wire.protocol.rejection import OtherVersionError, RejectedError
+from hoz_dist.wire.transport.ask import ask, messages_in
 
 _log = logging.getLogger(__name__)
 M = TypeVar("M", bound=Message)
@@ -35,7 +35,7 @@ class Asking:
         self._stop = stop
         self._epochs = epochs
         self._patience = Patience(first_try_s)
-        self._outage = learner_outage(_log)
+        self._outage = Outage(_log, "the learner does not answer; trying again", "the learner answers again")
 
     def once(
         self,

@@ -21,11 +21,11 @@ from zenoh.ext import (
 from zenoh.handlers import FifoChannel
 
 from hoz_dist.closing import Closing
-from hoz_dist.wire.codec import decode, encode
-from hoz_dist.wire.draining import Drain
-from hoz_dist.wire.message import Message
-from hoz_dist.wire.rejection import Reason, RejectedError
-from hoz_dist.wire.rejections import Rejections
+from hoz_dist.wire.protocol.codec import decode, encode
+from hoz_dist.wire.protocol.message import Message
+from hoz_dist.wire.protocol.rejection import Reason, RejectedError
+from hoz_dist.wire.protocol.rejections import Rejections
+from hoz_dist.wire.transport.draining import Drain
 
 M = TypeVar("M", bound=Message)
 _HEARTBEAT_S: Final = 0.5

@@ -6,7 +6,7 @@ import time
 from collections import Counter
 from typing import Final
 
-from hoz_dist.wire.rejection import Reason, plain
+from hoz_dist.wire.protocol.rejection import Reason, plain
 
 _log = logging.getLogger(__name__)
 LOG_EVERY_S: Final = 10.0

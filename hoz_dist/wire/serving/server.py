@@ -14,17 +14,17 @@ from hoz_dist.closing import Closing
 from hoz_dist.errors import HozError
 from hoz_dist.graph.room_graph import RoomGraph
 from hoz_dist.graph.scene_graph import SceneGraph
-from hoz_dist.wire.codec import checksum, decode, encode
-from hoz_dist.wire.graphs import room_graph_reply, scene_graph_reply
-from hoz_dist.wire.inbox import Inbox, Reaper, Request
-from hoz_dist.wire.keys import NOBODY, Keys, sender_of
-from hoz_dist.wire.message import Message
-from hoz_dist.wire.messages import EpisodesPush, GradientPush, Push, Refused, RoomGraphPush
-from hoz_dist.wire.publishing import NewestPublisher
-from hoz_dist.wire.queryable import answer, declare_queryable, parameters_of, refusal_of
-from hoz_dist.wire.rejection import Reason, RejectedError
-from hoz_dist.wire.rejections import Rejections
-from hoz_dist.wire.snapshots import GraphReply, Snapshots
+from hoz_dist.wire.protocol.codec import checksum, decode, encode
+from hoz_dist.wire.protocol.graphs import room_graph_reply, scene_graph_reply
+from hoz_dist.wire.protocol.keys import NOBODY, Keys, sender_of
+from hoz_dist.wire.protocol.message import Message
+from hoz_dist.wire.protocol.messages import EpisodesPush, GradientPush, Push, Refused, RoomGraphPush
+from hoz_dist.wire.protocol.rejection import Reason, RejectedError
+from hoz_dist.wire.protocol.rejections import Rejections
+from hoz_dist.wire.serving.inbox import Inbox, Reaper, Request
+from hoz_dist.wire.serving.snapshots import GraphReply, Snapshots
+from hoz_dist.wire.transport.publishing import NewestPublisher
+from hoz_dist.wire.transport.queryable import answer, declare_queryable, parameters_of, refusal_of
 
 _CHECKSUM_BYTES: Final = 8
 _LONGEST_QUESTION: Final = 4096

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from hoz_dist.errors import InvalidValueError
 from hoz_dist.graph.checks import MAX_ZONES, check_shapes, check_values
 from hoz_dist.nav.categories import SCENES, TARGETS
-from hoz_dist.wire.fields import EpisodeFields, RoomName
-from hoz_dist.wire.keys import NAME_PATTERN
-from hoz_dist.wire.rejection import Reason, RejectedError
-from hoz_dist.wire.schema import Int, Many, OneOf, Structure, Tensor, Text
+from hoz_dist.wire.protocol.fields import EpisodeFields, RoomName
+from hoz_dist.wire.protocol.keys import NAME_PATTERN
+from hoz_dist.wire.protocol.rejection import Reason, RejectedError
+from hoz_dist.wire.protocol.schema import Int, Many, OneOf, Structure, Tensor, Text
 
 MAX_PARAMETERS: Final = 30_000_000
 """Largest number of policy parameters; three times the paper's sizes, and within Zenoh's largest message."""

@@ -8,10 +8,10 @@ import zenoh
 from zenoh import Session
 from zenoh.handlers import FifoChannel
 
-from hoz_dist.wire.codec import decode
-from hoz_dist.wire.message import Message
-from hoz_dist.wire.rejection import RejectedError
-from hoz_dist.wire.waiting import Deadline, StoppedError
+from hoz_dist.waiting import Deadline, StoppedError
+from hoz_dist.wire.protocol.codec import decode
+from hoz_dist.wire.protocol.message import Message
+from hoz_dist.wire.protocol.rejection import RejectedError
 
 _TIMED_OUT: Final = b"Timeout"
 """What Zenoh itself puts into an error reply when a queryable holds a query too long."""

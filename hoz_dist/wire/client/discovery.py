@@ -3,11 +3,11 @@
 import threading
 
 from hoz_dist.errors import InvalidValueError, NotFoundError
-from hoz_dist.wire.ask import ask, messages_in
-from hoz_dist.wire.keys import ALL_CONFIGS, Keys
-from hoz_dist.wire.messages import ConfigReply
-from hoz_dist.wire.session import Session
-from hoz_dist.wire.waiting import Backoff, Deadline
+from hoz_dist.waiting import Backoff, Deadline
+from hoz_dist.wire.protocol.keys import ALL_CONFIGS, Keys
+from hoz_dist.wire.protocol.messages import ConfigReply
+from hoz_dist.wire.transport.ask import ask, messages_in
+from hoz_dist.wire.transport.session import Session
 
 FIND_S = 2.0
 """How long to look for a learner; it may be starting, or its router may not know it yet."""

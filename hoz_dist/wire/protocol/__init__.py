@@ -1,0 +1,1 @@
+"""What travels: keys, messages, their encoding and checks. No session is needed."""

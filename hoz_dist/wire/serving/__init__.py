@@ -1,0 +1,1 @@
+"""The learner's side: takes pushes, answers questions, publishes parameters and graphs."""

@@ -1,0 +1,138 @@
+"""Serves parameters: a small head is published, the bulk is given out in shards, one after the other.
+
+The version that somebody is reading is kept, so that a fetch never mixes two, however fast the learner is. One shard at
+a time is under way to each reader, and fits the sending queue of its link: who reads slowly, or stands still, holds up
+nobody else.
+"""
+
+import time
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from zenoh import KeyExpr, Query, Session
+
+from hoz_dist.closing import Closing
+from hoz_dist.wire.protocol.keys import NAME_PATTERN, NOBODY, Keys
+from hoz_dist.wire.protocol.message import SHARD_ELEMENTS
+from hoz_dist.wire.protocol.messages import Busy, ParametersHead, ParametersShard, Refused
+from hoz_dist.wire.protocol.parameters import Parameters, head_of
+from hoz_dist.wire.protocol.rejection import Reason, RejectedError
+from hoz_dist.wire.protocol.rejections import Rejections
+from hoz_dist.wire.serving.versions import Versions
+from hoz_dist.wire.transport.publishing import NewestPublisher
+from hoz_dist.wire.transport.queryable import answer, declare_queryable, parameters_of
+from hoz_dist.wire.transport.shared_memory import SharedMemory
+
+_LONGEST_NUMBER: Final = 18
+"""Digits of numbers in questions; no more than 2^63 - 1."""
+
+
+class ParametersPublisher(Closing):
+    """Publishes the head of the newest parameters and serves shards.
+
+    Args:
+        session: Session of the learner.
+        keys: Keys of the run.
+        rejections: Where questions that cannot be understood are counted.
+        versions: What is kept for readers.
+        memory: Shared memory for the shards; None for none.
+    """
+
+    def __init__(
+        self,
+        session: Session,
+        keys: Keys,
+        rejections: Rejections | None = None,
+        versions: Versions | None = None,
+        memory: SharedMemory | None = None,
+    ) -> None:
+        self._keys = keys
+        self._memory = memory
+        self._rejections = rejections or Rejections()
+        self._versions = versions or Versions()
+        self._publisher = NewestPublisher(session, keys.params)
+        self._queryable = declare_queryable(session, keys.all_params, self._answer)
+
+    def publish(self, epoch: int, version: int, vector: NDArray[np.float32]) -> ParametersHead:
+        """Make a version the newest one.
+
+        Args:
+            epoch: Epoch of the learner.
+            version: Version of the parameters; never falls within an epoch.
+            vector: [P] f32; copied, so that the learner may go on with its own.
+        """
+        copy = np.array(vector, "<f4")
+        copy.flags.writeable = False
+        head = head_of(epoch, version, copy)
+        self._versions.newest = Parameters(head, copy)
+        self._publisher.publish(head)
+        return head
+
+    def close(self) -> None:
+        """Stop publishing and serving."""
+        self._queryable.close()
+        self._publisher.close()
+
+    def _answer(self, query: Query) -> None:
+        """Reply with the head or with one shard."""
+        newest = self._versions.newest
+        if newest is None:
+            query.drop()  # type: ignore[no-untyped-call]
+        elif query.key_expr.intersects(KeyExpr(self._keys.params)):
+            answer(query, self._keys.params, newest.head)
+        else:
+            self._answer_shard(query, newest.head)
+
+    def _answer_shard(self, query: Query, newest: ParametersHead) -> None:
+        key = str(query.key_expr)
+        try:
+            reply = self._shard(key.removeprefix(self._keys.params + "/"), parameters_of(query))
+        except RejectedError as error:
+            if error.reason != Reason.GONE:
+                self._rejections.count(error.reason, error.detail, NOBODY)
+            answer(query, key, Refused.of(error, newest.epoch))
+        else:
+            answer(query, key, reply or Busy(newest.epoch), self._memory)
+
+    def _shard(self, name: str, asked: dict[str, str]) -> ParametersShard | None:
+        """Return the shard that is asked for; None when one more version cannot be kept now.
+
+        Args:
+            name: Number of the shard, the last part of the key.
+            asked: ``reader``: who asks; ``epoch`` and ``version``: of what, the newest when not given.
+
+        Raises:
+            RejectedError: The version is gone, or the question cannot be understood.
+        """
+        number, reader, now = _number("the shard", name), asked.get("reader", ""), time.monotonic()
+        if not NAME_PATTERN.fullmatch(reader):
+            raise RejectedError(Reason.NAME, f"the reader's name is not well formed: {reader!r:.80}")
+        if "version" in asked:
+            stamp = (_number("the epoch", asked.get("epoch", "")), _number("the version", asked["version"]))
+            parameters = self._versions.go_on(reader, stamp, now)
+            if parameters is None:
+                raise RejectedError(Reason.GONE, f"version {stamp[1]} of epoch {stamp[0]} is not kept any more")
+        else:
+            begun = self._versions.begin(reader, now)
+            if begun is None:
+                return None
+            parameters = begun
+        head = parameters.head
+        if number >= head.shards:
+            raise RejectedError(Reason.RANGE, f"shard {number} was asked for, and there are {head.shards}")
+        if number == head.shards - 1:
+            self._versions.end(reader)
+        start = number * SHARD_ELEMENTS
+        return ParametersShard(head, number, parameters.vector[start : start + SHARD_ELEMENTS])
+
+
+def _number(what: str, text: str) -> int:
+    """Return the number that a part of a question is.
+
+    Raises:
+        RejectedError: It is none.
+    """
+    if not (text.isascii() and text.isdigit() and len(text) <= _LONGEST_NUMBER):
+        raise RejectedError(Reason.MALFORMED, f"{what} is no number: {text!r:.80}")
+    return int(text)
