@@ -1,8 +1,9 @@
 """Whether every acknowledged push counts exactly once, from nothing but files: journals, records and checkpoints.
 
 A push that was acknowledged in epoch e is covered if the version at the answer is not beyond the one that the next
-epoch began from, or, in the last epoch, the one of the last checkpoint. What was acknowledged and is not covered was
-lost with its learner, which is what a checkpoint interval may cost.
+epoch began from, or, in the last epoch, the one of the last checkpoint. Pushes that make no version must be of an
+earlier one: at the same version they may have come after the checkpoint was taken. What was acknowledged and is not
+covered was lost with its learner, which is what a checkpoint interval may cost.
 """
 
 import json
@@ -67,7 +68,7 @@ def audit(run: Path, pushes: Sequence[Acknowledged]) -> Audit:
     """
     epochs, checkpoint = _epochs(run), load_checkpoint(run)
     record = Counter(_joined(epochs))
-    covered = [push for push in pushes if push.version <= _bound(push.epoch, epochs, checkpoint)]
+    covered = [push for push in pushes if _is_covered(push, _bound(push.epoch, epochs, checkpoint))]
     gradients = [push for push in covered if push.kind == "gradient"]
     told = {_identity(push) for push in pushes if push.kind == "gradient"}
     figures = AuditFigures(
@@ -113,6 +114,10 @@ def _joined(epochs: Iterable[_Epoch]) -> list[Identity]:
 def _bound(epoch: int, epochs: Sequence[_Epoch], checkpoint: Checkpoint) -> int:
     """Return the version up to which an epoch's updates last."""
     return next((later.from_version for later in epochs if later.number > epoch), checkpoint.version)
+
+
+def _is_covered(push: Acknowledged, bound: int) -> bool:
+    return push.version < bound or (push.version == bound and push.kind == "gradient")
 
 
 def _identity(push: Acknowledged) -> Identity:
