@@ -38,6 +38,8 @@ class AuditFigures:
     """Those among them that are covered by a checkpoint."""
     lost_with_their_learner: int
     """Gradients that were acknowledged and are not covered."""
+    longest_loss_seconds: float
+    """Longest time, from the first to the last of them in an epoch, in which one learner acknowledged them."""
     applied_unacknowledged: int
     """Gradients in the record whose actor was killed before it heard of it."""
     problems: list[str]
@@ -70,13 +72,15 @@ def audit(run: Path, pushes: Sequence[Acknowledged]) -> Audit:
     record = Counter(_joined(epochs))
     covered = [push for push in pushes if _is_covered(push, _bound(push.epoch, epochs, checkpoint))]
     gradients = [push for push in covered if push.kind == "gradient"]
+    lost = sorted(set(pushes).difference(covered, (push for push in pushes if push.kind != "gradient")))
     told = {_identity(push) for push in pushes if push.kind == "gradient"}
     figures = AuditFigures(
         epochs=len(epochs),
         version=checkpoint.version,
         acknowledged=dict(Counter(push.kind for push in pushes)),
         covered=dict(Counter(push.kind for push in covered)),
-        lost_with_their_learner=sum(push.kind == "gradient" for push in pushes) - len(gradients),
+        lost_with_their_learner=len(lost),
+        longest_loss_seconds=round(_longest_span(lost), 1),
         applied_unacknowledged=sum(identity not in told for identity in record),
         problems=[
             *_problems_of_record(run, epochs, record, checkpoint),
@@ -118,6 +122,17 @@ def _bound(epoch: int, epochs: Sequence[_Epoch], checkpoint: Checkpoint) -> int:
 
 def _is_covered(push: Acknowledged, bound: int) -> bool:
     return push.version < bound or (push.version == bound and push.kind == "gradient")
+
+
+def _is_covered(push: Acknowledged, bound: int) -> bool:
+    return push.version <= bound if push.kind == "gradient" else push.version < bound
+
+
+def _longest_span(lost: Iterable[Acknowledged]) -> float:
+    times: dict[int, list[float]] = {}
+    for push in lost:
+        times.setdefault(push.epoch, []).append(push.time)
+    return max((max(some) - min(some) for some in times.values()), default=0.0)
 
 
 def _identity(push: Acknowledged) -> Identity:

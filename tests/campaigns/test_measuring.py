@@ -64,6 +64,15 @@ def test_the_audit_takes_what_a_killed_learner_lost_for_lost(tmp_path: Path) -> 
     assert [push.sequence for push in lasting] == [0, 1, 3, 4]
 
 
+def test_a_checkpoint_may_lack_episodes_that_were_reported_at_its_version(tmp_path: Path) -> None:
+    write_run(tmp_path, [(0, [0, 1]), (2, [2])], seen=[0, 1, 2])
+    reports = [gradient(sequence, 1, version)._replace(kind="episodes") for sequence, version in ((0, 1), (1, 2))]
+    figures, _, _ = audit(tmp_path, reports)
+    assert figures.covered == {"episodes": 1}
+    assert len(figures.problems) == 1
+    assert "sequence=0" in figures.problems[0]
+
+
 def test_the_audit_finds_an_acknowledged_gradient_that_is_not_in_the_record(tmp_path: Path) -> None:
     write_run(tmp_path, [(0, [0, 2])], seen=[0, 1, 2])
     problems = audit(tmp_path, [gradient(0, 1, 1), gradient(1, 1, 2)]).figures.problems
