@@ -124,10 +124,6 @@ def _is_covered(push: Acknowledged, bound: int) -> bool:
     return push.version < bound or (push.version == bound and push.kind == "gradient")
 
 
-def _is_covered(push: Acknowledged, bound: int) -> bool:
-    return push.version <= bound if push.kind == "gradient" else push.version < bound
-
-
 def _longest_span(lost: Iterable[Acknowledged]) -> float:
     times: dict[int, list[float]] = {}
     for push in lost:
