@@ -72,8 +72,14 @@ def render_rooms(rooms: Sequence[RoomId], cache: Path, picture_size: int, jobs: 
         tasks.put(task)
     arguments = (tasks, reports, cache, picture_size, encoding)
     workers = [context.Process(target=_render, args=arguments, daemon=True) for _ in range(count)]
-    for worker in workers:
-        worker.start()
+    # Ctrl-C reaches every process of the terminal, and this one acts on it. Processes start with their parent's mask, so
+    # that it cannot hit one in the midst of its imports.
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        for worker in workers:
+            worker.start()
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
     try:
         return _follow(workers, reports, len(rooms))
     finally:
@@ -122,8 +128,6 @@ def _render(
     encoding: Encoding,
 ) -> None:
     """Fill the cache for one room after another; the body of a rendering process."""
-    # Ctrl-C reaches every process of the terminal; the main process acts on it.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
     encoder, store = load_encoder(*encoding), ViewStore(cache, picture_size)
     while (room := tasks.get()) is not None:
         rendered = False
