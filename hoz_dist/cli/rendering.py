@@ -72,8 +72,8 @@ def render_rooms(rooms: Sequence[RoomId], cache: Path, picture_size: int, jobs: 
         tasks.put(task)
     arguments = (tasks, reports, cache, picture_size, encoding)
     workers = [context.Process(target=_render, args=arguments, daemon=True) for _ in range(count)]
-    # Ctrl-C reaches every process of the terminal, and this one acts on it. Processes start with their parent's mask, so
-    # that it cannot hit one in the midst of its imports.
+    # Ctrl-C reaches every process of the terminal, and this one acts on it. Processes start with their parent's mask,
+    # so that it cannot hit one in the midst of its imports.
     mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         for worker in workers:
