@@ -24,7 +24,7 @@ from hoz_dist.wire.client.discovery import find_run, find_runs
 from hoz_dist.wire.client.epochs import of_highest_epoch
 from hoz_dist.wire.protocol.codec import PROTOCOL_VERSION
 from hoz_dist.wire.protocol.graphs import plan_of, room_graph_of, scene_graph_of
-from hoz_dist.wire.protocol.keys import Keys
+from hoz_dist.wire.protocol.keys import SEEN_SEPARATOR, Keys
 from hoz_dist.wire.protocol.messages import (
     ConfigReply,
     PlanReply,
@@ -34,7 +34,6 @@ from hoz_dist.wire.protocol.messages import (
     StatusReply,
 )
 from hoz_dist.wire.protocol.rejection import Reason, RejectedError
-from hoz_dist.wire.serving.snapshots import SEEN_SEPARATOR
 from hoz_dist.wire.transport.ask import ask, messages_in
 from hoz_dist.wire.transport.endpoint import DEFAULT_ENDPOINT
 from hoz_dist.wire.transport.session import open_client

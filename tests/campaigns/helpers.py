@@ -4,8 +4,7 @@ import signal
 import subprocess
 import sys
 import threading
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Final
@@ -50,17 +49,3 @@ def finish(*processes: "subprocess.Popen[bytes]") -> None:
 def pause(seconds: float) -> None:
     """Let time pass: a campaign is made of times."""
     threading.Event().wait(max(seconds, 0.0))
-
-
-def wait_until(wanted: Callable[[], bool], what: str, within_s: float = 90.0) -> None:
-    """Wait for a condition.
-
-    Raises:
-        TimeoutError: It does not come true in time.
-    """
-    end = time.monotonic() + within_s
-    while not wanted():
-        if time.monotonic() > end:
-            message = f"waited {within_s:g} s in vain for {what}"
-            raise TimeoutError(message)
-        pause(0.1)

@@ -14,11 +14,12 @@ import click
 
 from tests.campaigns.audit import AuditFigures, audit
 from tests.campaigns.cluster import ROUTER, Cluster, prepare_views, start
-from tests.campaigns.helpers import pause, wait_until
+from tests.campaigns.helpers import pause
 from tests.campaigns.journals import FrameRate, first_of
 from tests.campaigns.namespaces import HUB_FROM_FAR, HUB_FROM_NEAR, BadLink, Network
 from tests.campaigns.report import show
 from tests.campaigns.supervisor import Supervisor
+from tests.waiting import until
 
 LEARNER: Final = "learner-a"
 PORT: Final = 7447
@@ -94,13 +95,13 @@ def network(folder: Path, cache: Path, settings: Settings) -> NetworkFigures:
             service = _Service(cluster, supervisor, net)
             start(supervisor, cluster.router(f"tcp/0.0.0.0:{PORT}"), cluster.learner(LEARNER))
             start(supervisor, cluster.actor("near", f"tcp/{HUB_FROM_NEAR}:{PORT}"))
-            wait_until(lambda: service.answers("near") > 0, "the near actor to train")
+            until(lambda: service.answers("near") > 0, "the near actor to train")
             pause(settings.warm_up_s)
             before = service.measure(settings.measure_s)
 
             far_began = time.time()
             start(supervisor, cluster.actor("far", f"tcp/{HUB_FROM_FAR}:{PORT}"))
-            wait_until(lambda: service.answers("far") > 0, "the far actor's first gradient", JOIN_S)
+            until(lambda: service.answers("far") > 0, "the far actor's first gradient", JOIN_S)
             far_seconds = time.time() - far_began
             lives = len(supervisor.lives)
             with_far = service.measure(settings.measure_s)
@@ -167,7 +168,7 @@ class _Service:
         known = self.answers(host)
         self._net.mend(host)
         mended = time.time()
-        wait_until(lambda: self.answers(host) > known, f"{host} to go on", JOIN_S)
+        until(lambda: self.answers(host) > known, f"{host} to go on", JOIN_S)
         answered = time.time() - mended
         first = first_of(self._cluster.acknowledged(host), host, mended)
         return answered if first is None else min(first, answered)

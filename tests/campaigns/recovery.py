@@ -20,10 +20,11 @@ from hoz_dist.wire.protocol.keys import Keys
 from hoz_dist.wire.transport.session import open_client
 from tests.campaigns.cluster import ROUTER, Cluster, prepare_views, start
 from tests.campaigns.faults import PAUSE_S, Fault, Kind, strike
-from tests.campaigns.helpers import pause, wait_until
+from tests.campaigns.helpers import pause
 from tests.campaigns.journals import FrameRate, first_of
 from tests.campaigns.report import show
 from tests.campaigns.supervisor import Supervisor
+from tests.waiting import until
 
 Target = Literal["actor", "learner", "router", "leader"]
 """A `learner` has no standby, a `leader` has one."""
@@ -188,15 +189,15 @@ class _Service:
         while self._seconds(fault) is None and time.time() < end:
             pause(1.0)
         hit = [fault.name] if target == "actor" else self.ACTORS
-        wait_until(lambda: self._first(fault, hit) is not None, "training to go on")
+        until(lambda: self._first(fault, hit) is not None, "training to go on")
         take_over = self._taken_over(fault) if target == "leader" else None
         return Recovery(target, kind, self._seconds(fault), self._first(fault, hit), take_over)
 
     def _calm(self, target: Target) -> str:
         """Wait until all has been well for a while; returns the name of the program to hit."""
-        wait_until(lambda: self._supervisor.settled() and self._complete(), "all processes to be there")
+        until(lambda: self._supervisor.settled() and self._complete(), "all processes to be there")
         since = time.time()
-        wait_until(lambda: all(self._acts(actor, since) for actor in self.ACTORS), "all actors to train")
+        until(lambda: all(self._acts(actor, since) for actor in self.ACTORS), "all actors to train")
         pause(self._times.before)
         match target:
             case "actor":

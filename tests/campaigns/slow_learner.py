@@ -19,11 +19,12 @@ from hoz_dist.wire.serving.inbox import MOST_WAITING
 from learner.checkpoint import load_checkpoint
 from tests.campaigns.audit import audit
 from tests.campaigns.cluster import ROUTER, Cluster, start
-from tests.campaigns.helpers import finish, helper, pause, wait_until
+from tests.campaigns.helpers import finish, helper, pause
 from tests.campaigns.memory import MemoryWatch, highest
 from tests.campaigns.pushers import Outcome, read_outcomes
 from tests.campaigns.report import show
 from tests.campaigns.supervisor import Supervisor
+from tests.waiting import until
 
 RUN_S: Final = 0.009
 STOP_S: Final = 0.081
@@ -83,7 +84,7 @@ def slow_learner(folder: Path, port: int, before_s: float, seconds: float) -> Sl
     with Supervisor(cluster.logs) as supervisor, MemoryWatch(supervisor) as memory:
         start(supervisor, cluster.router(), cluster.learner(LEARNER, "--max-lag", str(MOST_LAG)))
         with _pushers(cluster, files) as pushers:
-            wait_until(lambda: all(file.exists() and read_outcomes(file) for file in files), "gradients")
+            until(lambda: all(file.exists() and read_outcomes(file) for file in files), "gradients")
             began = time.time()
             pause(before_s)
             slow_since = time.time()

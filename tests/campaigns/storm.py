@@ -19,12 +19,13 @@ import click
 from tests.campaigns.audit import AuditFigures, audit
 from tests.campaigns.cluster import ROUTER, Cluster, prepare_views, start
 from tests.campaigns.faults import PAUSE_S, carry_out, plan
-from tests.campaigns.helpers import finish, helper, pause, wait_until
+from tests.campaigns.helpers import finish, helper, pause
 from tests.campaigns.journals import Acknowledged, FrameRate
 from tests.campaigns.memory import MemoryWatch, Sample, highest
 from tests.campaigns.report import show
 from tests.campaigns.supervisor import Life, Supervisor
 from tests.campaigns.windows import QueryFigures, Window, query_figures, read_notes, windows_without_leader
+from tests.waiting import until
 
 LEARNERS: Final = ("learner-a", "learner-b")
 SETTLED_MEMORY_S: Final = 120.0
@@ -128,14 +129,14 @@ def storm(folder: Path, cache: Path, port: int, settings: Settings) -> StormFigu
         start(supervisor, *(cluster.actor(name) for name in actors))
         words = ("--connect", cluster.endpoint, "--run", cluster.run.name, "--out", str(notes_file))
         with helper("prober", *words, log=cluster.logs / "prober.log") as prober:
-            wait_until(lambda: all(_trains(cluster, actor) for actor in actors), "gradients of all actors")
+            until(lambda: all(_trains(cluster, actor) for actor in actors), "gradients of all actors")
             calm = time.time()
             pause(settings.calm_s)
             began = time.time()
             blows = plan(random.Random(settings.seed), names, settings.seconds, settings.faults)
             faults = carry_out(supervisor, blows, names, settings.pause_s)
             pause(began + settings.seconds - time.time())
-            wait_until(supervisor.settled, "all processes to run")
+            until(supervisor.settled, "all processes to run")
             pause(settings.calm_s)
             ended = time.time()
             finish(prober)

@@ -4,9 +4,6 @@ import os
 import signal
 import subprocess
 import sys
-import threading
-import time
-from collections.abc import Callable
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -81,13 +78,3 @@ def children_of(parent: int) -> list[int]:
         except OSError:
             continue  # it ended meanwhile
     return found
-
-
-def until(wanted: Callable[[], bool], what: str) -> None:
-    """Wait until something is as wanted."""
-    pause, end = threading.Event(), time.monotonic() + DEADLINE_S
-    while not wanted():
-        if time.monotonic() > end:
-            message = f"waited {DEADLINE_S:g} s in vain for {what}"
-            raise TimeoutError(message)
-        pause.wait(0.05)

@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.integration.commands import SMALL_ROOMS, HozDist, until
+from tests.integration.commands import SMALL_ROOMS, HozDist
+from tests.waiting import until
 
 pytestmark = pytest.mark.integration
 

@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from hoz_dist.wire.transport.session import is_connected, open_client
-from tests.integration.commands import HozDist, hoz_dist, until
+from tests.integration.commands import HozDist, hoz_dist
+from tests.waiting import until
 
 pytestmark = pytest.mark.integration
 

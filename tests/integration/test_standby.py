@@ -16,7 +16,7 @@ from learner.checkpoint import load_checkpoint
 from learner.leadership import claim
 from learner.replay import read_updates
 from learner.standby import STILL_S
-from tests.integration.commands import HozDist, until
+from tests.integration.commands import HozDist
 from tests.integration.learning import (
     CONFIG,
     FakeActor,
@@ -26,6 +26,7 @@ from tests.integration.learning import (
     status_when,
     wait_for_checkpoint,
 )
+from tests.waiting import until
 
 pytestmark = pytest.mark.integration
 

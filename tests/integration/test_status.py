@@ -20,8 +20,9 @@ from hoz_dist.wire.protocol.keys import Keys
 from hoz_dist.wire.transport.environment import child_environment
 from hoz_dist.wire.transport.session import open_client, open_router
 from tests import wire_samples as samples
-from tests.integration.commands import HozDist, until
+from tests.integration.commands import HozDist
 from tests.integration.learning import FakeActor, LearnerProcess, running_learner, status_when
+from tests.waiting import until
 
 pytestmark = pytest.mark.integration
 

@@ -14,8 +14,9 @@ from hoz_dist.errors import HozError
 from learner.checkpoint import Checkpoint, load_checkpoint
 from learner.replay import read_updates
 from learner.run_folder import read_config
-from tests.integration.commands import SMALL_ROOMS, HozDist, children_of, hoz_dist, until
+from tests.integration.commands import SMALL_ROOMS, HozDist, children_of, hoz_dist
 from tests.integration.learning import LearnerProcess
+from tests.waiting import until
 
 pytestmark = pytest.mark.integration
 

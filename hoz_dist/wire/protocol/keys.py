@@ -49,6 +49,10 @@ def run_of(key: str) -> str:
     return key.split("/")[1]
 
 
+SEEN_SEPARATOR: Final = "+"
+"""Stands between the categories that are seen, in a question for a plan."""
+
+
 @dataclass(frozen=True)
 class Keys:
     """The key expressions of one run.

@@ -4,17 +4,16 @@ Questions are answered at once by the thread that receives them, also while the 
 """
 
 from collections.abc import Callable, Mapping
-from typing import Final
 
 from hoz_dist.errors import InvalidValueError, NotFoundError
 from hoz_dist.graph.planner import EdgeCost, plan_for
 from hoz_dist.nav.categories import SCENES, scene_index
 from hoz_dist.nav.rooms import RoomId
 from hoz_dist.wire.protocol.graphs import plan_reply, scene_graph_of
+from hoz_dist.wire.protocol.keys import SEEN_SEPARATOR
 from hoz_dist.wire.protocol.messages import ConfigReply, PlanReply, RoomGraphReply, SceneGraphReply, StatusReply
 
 GraphReply = SceneGraphReply | RoomGraphReply
-SEEN_SEPARATOR: Final = "+"
 
 
 class Snapshots:

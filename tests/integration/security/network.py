@@ -22,8 +22,9 @@ from hoz_dist.wire.transport.credentials import ROUTER_FILE, Credentials, load_c
 from hoz_dist.wire.transport.session import Session, open_client, open_router
 from hoz_dist.wire.transport.settings import CLIENT_LEASE_MS, client_settings, tls_settings
 from tests import wire_samples as samples
-from tests.integration.commands import HozDist, until
+from tests.integration.commands import HozDist
 from tests.integration.wire.pushing import answering
+from tests.waiting import until
 
 KEYS: Final = samples.KEYS
 DAY: Final = timedelta(days=1)

@@ -15,9 +15,10 @@ from hoz_dist.errors import ConnectionFailedError
 from hoz_dist.wire.protocol.messages import Accepted
 from hoz_dist.wire.transport.credentials import load_credentials
 from hoz_dist.wire.transport.session import open_client
-from tests.integration.commands import HozDist, hoz_dist, until
+from tests.integration.commands import HozDist, hoz_dist
 from tests.integration.learning import CONFIG, graph_of
 from tests.integration.security.network import free_endpoint
+from tests.waiting import until
 from workers.link import LearnerLink
 
 pytestmark = pytest.mark.integration

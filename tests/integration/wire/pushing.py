@@ -1,7 +1,6 @@
 """What the tests of the wire do again and again: push, take, answer, wait."""
 
 import threading
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
@@ -15,6 +14,7 @@ from hoz_dist.wire.serving.inbox import Inbox, Request
 from hoz_dist.wire.transport.ask import ask
 from hoz_dist.wire.transport.session import Session
 from tests import wire_samples as samples
+from tests.waiting import comes_true
 
 KEYS = samples.KEYS
 GRADS = KEYS.grads("a0")
@@ -45,12 +45,7 @@ def answering(inbox: Inbox, decide: Callable[[Push], PushReply]) -> Iterator[lis
 
 def until(condition: Callable[[], bool]) -> bool:
     """Wait until something is true; False when it does not come true in time."""
-    end, pause = time.monotonic() + WAIT_S, threading.Event()
-    while not condition():
-        if time.monotonic() > end:
-            return False
-        pause.wait(0.01)
-    return True
+    return comes_true(condition, WAIT_S)
 
 
 def push_to(session: Session, push: Push, key: str = GRADS) -> PushReply:

@@ -24,8 +24,8 @@ from hoz_dist.wire.transport.draining import Drain
 from hoz_dist.wire.transport.session import Session, open_client, open_router
 from hoz_dist.wire.transport.shared_memory import LEAST_BYTES, SharedMemory
 from tests import wire_samples as samples
-from tests.integration.commands import until
 from tests.integration.wire.pushing import GRADS, KEYS, answering
+from tests.waiting import until
 
 pytestmark = pytest.mark.integration
 

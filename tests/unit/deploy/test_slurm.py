@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.integration.commands import until
 from tests.unit.deploy.reading import DEPLOY, ROOT, parse, process_settings
+from tests.waiting import until
 
 FOLDER = DEPLOY / "slurm"
 RUN, ACTORS = FOLDER / "run.sbatch", FOLDER / "actors.sbatch"

@@ -3,8 +3,8 @@ import signal
 import subprocess
 from pathlib import Path
 
-from tests.integration.commands import until
 from tests.unit.deploy.reading import DEPLOY
+from tests.waiting import until
 
 
 def pool(folder: Path, *names: str) -> Path:
