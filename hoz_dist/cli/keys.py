@@ -65,18 +65,21 @@ def init_command(folder: Path) -> None:
     "hosts",
     multiple=True,
     metavar="HOST",
-    help="Of a router: name or address that clients connect to; may be repeated.  [always: localhost, 127.0.0.1]",
+    help="Of a router: name or address that clients connect to; may be repeated.  "
+    "[default: as before; always: localhost, 127.0.0.1]",
 )
 @click.option(
     "--listen",
     multiple=True,
     metavar="ENDPOINT",
-    help=f"Of a router: endpoint in its router.json5; may be repeated.  [default: {DEFAULT_ENCRYPTED_ENDPOINT}]",
+    help="Of a router: endpoint in its router.json5; may be repeated.  "
+    f"[default: as before, else {DEFAULT_ENCRYPTED_ENDPOINT}]",
 )
 @click.option(
     "--at",
     metavar="FOLDER",
-    help="Of a router: where its key folder will be on its machine, /etc/hoz/keys say.  [default: where it is made]",
+    help="Of a router: where its key folder will be on its machine, /etc/hoz-dist/keys/router-main say.  "
+    "[default: as before, else where it is made]",
 )
 @click.option(
     "--replace", is_flag=True, help="Issue a key anew; the old one stays valid until it expires. Default: refuse."
@@ -152,7 +155,7 @@ def _place(role: str, hosts: tuple[str, ...], listen: tuple[str, ...], at: str |
         if not is_encrypted(check_endpoint(endpoint)):
             message = f"'{endpoint}' is not encrypted, so that keys protect nothing there; write tls/host:port."
             raise InvalidValueError(message)
-    return RouterPlace(hosts, listen or (DEFAULT_ENCRYPTED_ENDPOINT,), at)
+    return RouterPlace(hosts, listen, at)
 
 
 def _as_json(identity: "Identity", folder: Path) -> dict[str, Any]:

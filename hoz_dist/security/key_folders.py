@@ -31,17 +31,33 @@ _LOCAL_HOSTS: Final = ("localhost", "127.0.0.1")
 
 @dataclass(frozen=True)
 class RouterPlace:
-    """Where a router will be.
+    """Where a router will be. What is left out is as it was when the router had a key before.
 
     Attributes:
         hosts: Names and addresses by which clients reach it, besides those of the machine itself.
-        listen: Endpoints where it listens.
-        at: Where its key folder will be on its machine; None for where it is made.
+        listen: Endpoints where it listens; for a new router the default one.
+        at: Where its key folder will be on its machine; for a new router where it is made.
     """
 
     hosts: tuple[str, ...] = ()
-    listen: tuple[str, ...] = (DEFAULT_ENCRYPTED_ENDPOINT,)
+    listen: tuple[str, ...] = ()
     at: str | None = None
+
+    def after(self, before: Identity | None, made_in: Path) -> "RouterPlace":
+        """Return the whole place.
+
+        Args:
+            before: The router as it is in the register; None for a new one.
+            made_in: Where its key folder is made.
+        """
+        hosts = self.hosts or (before.hosts if before else ())
+        listen = self.listen or (before.listen if before else ())
+        at = self.at or (before.at if before else "")
+        return RouterPlace(
+            tuple(dict.fromkeys((*_LOCAL_HOSTS, *hosts))),
+            listen or (DEFAULT_ENCRYPTED_ENDPOINT,),
+            at or str(made_in.absolute()),
+        )
 
 
 def create_authority(folder: Path) -> None:
@@ -100,7 +116,10 @@ def issue_keys(
             if target.exists() and not replace:
                 message = f"The {role} '{name}' has a key already, '{target}'; add --replace to issue it anew."
                 raise InvalidValueError(message)
-        issued = [(_issue(authority, role, name, lifetime, target, place), target) for name, target in targets.items()]
+        issued = []
+        for name, target in targets.items():
+            whole = place.after(register.find(role, name), target) if place else None
+            issued.append((_issue(authority, role, name, lifetime, target, whole), target))
         register.add(*(identity for identity, _ in issued))
         _write_router_files(folder, register)
     return issued
@@ -155,17 +174,17 @@ def _issue(
     authority: Authority, role: str, name: str, lifetime: timedelta, target: Path, place: RouterPlace | None
 ) -> Identity:
     """Make one key and its folder."""
-    hosts = tuple(dict.fromkeys((*_LOCAL_HOSTS, *place.hosts))) if place else ()
-    pair = authority.issue(common_name(role, name), hosts, lifetime)
+    place = place or RouterPlace()
+    pair = authority.issue(common_name(role, name), place.hosts, lifetime)
     _replace_folder(target, authority, pair)
     return Identity(
         role=role,
         name=name,
         serial=f"{pair.certificate.serial_number:x}",
         expires=pair.certificate.not_valid_after_utc,
-        hosts=hosts,
-        listen=place.listen if place else (),
-        at=(place.at or str(target.absolute())) if place else "",
+        hosts=place.hosts,
+        listen=place.listen,
+        at=place.at or "",
     )
 
 

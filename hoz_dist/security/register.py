@@ -84,6 +84,10 @@ class Register:
         """All of them, sorted by role and name."""
         return tuple(self._identities[key] for key in sorted(self._identities))
 
+    def find(self, role: str, name: str) -> Identity | None:
+        """Return somebody; None when nobody of that name is known."""
+        return self._identities.get((role, name))
+
     def add(self, *identities: Identity) -> None:
         """Write down that keys were issued; who was known already is replaced."""
         for identity in identities:

@@ -82,6 +82,17 @@ def test_mistakes_are_said_in_one_sentence(keys: Path, capsys: pytest.CaptureFix
     assert not Path("none").exists()
 
 
+def test_a_routers_key_is_replaced_without_saying_again_where_it_is(keys: Path) -> None:
+    place = ["--host", "router.lab", "--listen", "tls/0.0.0.0:443", "--at", "/etc/hoz-dist/keys/router-r0"]
+    assert run(["keys", "issue", "router", "r0", *place]) == 0
+    file = keys / "router-r0" / "router.json5"
+    before = file.read_text()
+    assert run(["keys", "issue", "router", "r0", "--replace"]) == 0
+    assert file.read_text() == before
+    [issued] = json.loads((keys / "issued.json").read_text())["issued"]
+    assert issued["hosts"] == ["localhost", "127.0.0.1", "router.lab"]
+
+
 def test_a_key_is_withdrawn(keys: Path, capsys: pytest.CaptureFixture[str]) -> None:
     run(["keys", "issue", "router", "r0"])
     run(["keys", "issue", "viewer", "v0"])

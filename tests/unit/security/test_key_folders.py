@@ -8,11 +8,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from cryptography import x509
 
 from hoz_dist.errors import InvalidValueError, NotFoundError, UnknownNameError
 from hoz_dist.security.key_folders import RouterPlace, create_authority, issue_keys, withdraw_key
 from hoz_dist.security.register import Register
 from hoz_dist.wire.transport.credentials import ROUTER_FILE, load_credentials
+from hoz_dist.wire.transport.endpoint import DEFAULT_ENCRYPTED_ENDPOINT
 
 DAY = timedelta(days=1)
 
@@ -40,6 +42,13 @@ def subjects(folder: Path, router: str = "r0") -> set[str]:
     found = set(re.findall(r'"cert_common_names": \[\s*"([^"]+)"', router_text(folder, router)))
     assert found == {subject["id"] for subject in router_config(folder, router)["access_control"]["subjects"]}
     return found
+
+
+def hosts_of(folder: Path) -> set[str]:
+    """Return what a router's certificate is valid for."""
+    certificate = x509.load_pem_x509_certificate((folder / "certificate.pem").read_bytes())
+    names = certificate.extensions.get_extension_for_class(x509.SubjectAlternativeName).value
+    return {str(name.value) for name in names}
 
 
 def router_text(folder: Path, router: str = "r0") -> str:
@@ -158,6 +167,26 @@ def test_a_routers_file_says_where_it_will_be(folder: Path) -> None:
     assert tls["enable_mtls"] is tls["close_link_on_expiration"] is True
     [router] = [one for one in Register(folder).identities if one.role == "router"]
     assert router.hosts == ("localhost", "127.0.0.1", "router.lab")
+
+
+def test_a_router_stays_where_it_is_unless_it_is_said_otherwise(folder: Path) -> None:
+    place = RouterPlace(("router.lab",), ("tls/0.0.0.0:443",), "/etc/keys")
+    [(old, _)] = issue_keys(folder, "router", ["r0"], DAY, place)
+    [(new, path)] = issue_keys(folder, "router", ["r0"], DAY, RouterPlace(), replace=True)
+    assert (new.hosts, new.listen, new.at) == (old.hosts, old.listen, old.at)
+    assert hosts_of(path) == {"localhost", "127.0.0.1", "router.lab"}
+    assert router_config(folder)["listen"]["endpoints"] == ["tls/0.0.0.0:443"]
+
+    moved = RouterPlace(("gate.lab",), at="/keys")
+    [(new, path)] = issue_keys(folder, "router", ["r0"], DAY, moved, replace=True)
+    assert (new.hosts, new.listen, new.at) == (("localhost", "127.0.0.1", "gate.lab"), ("tls/0.0.0.0:443",), "/keys")
+    assert hosts_of(path) == {"localhost", "127.0.0.1", "gate.lab"}
+
+
+def test_a_new_router_has_defaults(folder: Path) -> None:
+    [(router, path)] = issue_keys(folder, "router", ["r0"], DAY, RouterPlace())
+    assert (router.hosts, router.listen) == (("localhost", "127.0.0.1"), (DEFAULT_ENCRYPTED_ENDPOINT,))
+    assert router.at == str(path)
 
 
 def test_a_routers_file_holds_no_key(folder: Path) -> None:

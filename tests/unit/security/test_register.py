@@ -17,6 +17,13 @@ def test_it_remembers_who_has_a_key(tmp_path: Path) -> None:
     assert Register(tmp_path).identities == (ACTOR, ROUTER)
 
 
+def test_it_finds_who_has_a_key(tmp_path: Path) -> None:
+    register = Register(tmp_path)
+    register.add(ROUTER, ACTOR)
+    assert register.find("router", "r0") == ROUTER
+    assert register.find("router", "a0") is None
+
+
 def test_a_key_that_is_issued_anew_replaces_the_old_one(tmp_path: Path) -> None:
     Register(tmp_path).add(ACTOR, ROUTER)
     renewed = Identity("actor", "a0", "3d", EXPIRES)
