@@ -7,31 +7,36 @@ from typing import Final
 from hoz_dist.cli.checks.finding import Finding
 from hoz_dist.client import HozClient
 from hoz_dist.errors import HozError
+from hoz_dist.wire.transport.credentials import Credentials
 
 _QUESTIONS: Final = 5
 
 
-def check_router(endpoint: str) -> Finding:
+def check_router(endpoint: str, credentials: Credentials | None = None) -> Finding:
     """Ask the learner behind an endpoint how it is, a few times.
 
     Args:
         endpoint: For example ``tcp/127.0.0.1:7447``.
+        credentials: Who asks; None at a router without keys.
     """
     try:
-        with HozClient(endpoint) as client:
+        with HozClient(endpoint, credentials=credentials) as client:
             runs = client.runs()
         if not runs:
-            return Finding("router", "warn", f"{endpoint} answers, but no learner", "Start one: hoz-dist learner.")
-        answers = [_learner(endpoint, run) for run in runs]
+            advice = "Start one: hoz-dist learner."
+            if credentials is not None:
+                advice += " If one runs, give the router its newest router.json5, and start it again."
+            return Finding("router", "warn", f"{endpoint} answers, but no learner", advice)
+        answers = [_learner(endpoint, run, credentials) for run in runs]
     except HozError as error:
         return Finding("router", "fail", str(error).rstrip("."))
     return Finding("router", "ok", "; ".join(answers))
 
 
-def _learner(endpoint: str, run: str) -> str:
+def _learner(endpoint: str, run: str, credentials: Credentials | None) -> str:
     """Say who takes part in a run, and how fast its learner answers."""
     times = []
-    with HozClient(endpoint, run=run) as client:
+    with HozClient(endpoint, run, credentials) as client:
         for _ in range(_QUESTIONS):
             start = time.perf_counter()
             status = client.status()
