@@ -233,9 +233,17 @@ def test_only_clients_reach_the_router_and_nobody_else_is_reached(manifests: Man
     assert clients == {"learner", "actor"}
     assert rule["ports"] == [{"port": 7447, "protocol": "TCP"}]
     # And clients get out to it.
+    let_out = {name for name, one in labels.items() if matches(policies["client"]["podSelector"]["matchLabels"], one)}
+    assert let_out == clients
     to_router = policies["client"]["egress"][0]
     assert matches(to_router["to"][0]["podSelector"]["matchLabels"], labels["router"])
     assert to_router["ports"] == rule["ports"]
+
+
+def test_another_pod_that_is_a_client_may_talk_to_whom_it_likes(manifests: Manifests) -> None:
+    bridge = {"app": "bridge", "hoz-dist/client": "true"}
+    for one in manifests.of("NetworkPolicy"):
+        assert not matches(one["spec"]["podSelector"]["matchLabels"], bridge)
 
 
 def test_images_are_of_this_version(manifests: Manifests) -> None:

@@ -1,5 +1,6 @@
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -116,6 +117,19 @@ def test_run_starts_a_router_and_two_learners_of_it(cluster: Cluster, keys: Mapp
         assert "--standby" in words
         assert option(words, "--minutes") == "600"
         assert not keys or option(words, "--keys") == f"/keys/learner-{option(words, '--name')}"
+
+
+def test_steps_of_the_run_run_side_by_side(cluster: Cluster) -> None:
+    """A step that does not say what it needs takes all memory of the job, and the next one waits for it."""
+    cluster.command("srun", NOTE)
+    cluster.run(RUN)
+    steps = [words[: words.index("hoz-dist")] for words in cluster.called("srun")]
+    assert len(steps) == 3
+    assert all("--exact" in words for words in steps)
+    (of_the_job,) = re.findall(r"^#SBATCH --mem=(\d+)G$", RUN.read_text(), re.MULTILINE)
+    needed = [int(word.removeprefix("--mem=").removesuffix("G")) for words in steps for word in words if "mem" in word]
+    assert len(needed) == 3
+    assert sum(needed) <= int(of_the_job)
 
 
 @pytest.mark.parametrize("script", [RUN, ACTORS], ids=lambda path: path.name)
