@@ -2,7 +2,7 @@
 
     core = LearnerCore(config, initial_parameters(config.policy, config.seed), epoch=1)
     for effect in core.handle(GradientReceived(request=7, push=push), now=time.monotonic()):
-        ...  # carried out by `learner.service`
+        ...  # carried out by `learner.serving`
 
 Gradients are applied as they arrive. The parameter version counts the updates; a gradient's lag is how many versions
 the parameters went on since the version that it was computed on.
