@@ -10,6 +10,7 @@ import click
 
 from hoz_dist.cli.connecting import connect_option, credentials_in, keys_option, run_option, shared_memory_option
 from hoz_dist.cli.options import cache_option, weights_option
+from hoz_dist.cli.stopping import stop_on_signals
 from hoz_dist.nav.categories import SCENES
 
 CONNECT_S: Final = 5.0
@@ -61,8 +62,6 @@ def actor_command(
     Any number of actors may join, leave and come back. SIGINT and SIGTERM stop this one cleanly.
     """
     import logging
-    import signal
-    import threading
     from contextlib import ExitStack, suppress
 
     from hoz_dist.nav.rooms import training_rooms
@@ -74,9 +73,7 @@ def actor_command(
     credentials = credentials_in(keys, ["actor"])
     actor = credentials.own_name(name) if credentials else name or _default_name()
     logging.basicConfig(level=logging.INFO, format="%(asctime)s %(message)s", datefmt="%H:%M:%S")
-    stop = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: stop.set())
+    stop = stop_on_signals()
     with (
         suppress(StoppedError),
         SharedMemory(on=shared_memory) as memory,

@@ -7,6 +7,7 @@ import click
 
 from hoz_dist.cli.connecting import keys_option, shared_memory_option
 from hoz_dist.cli.run_options import run_config, run_options
+from hoz_dist.cli.stopping import stop_on_signals
 from hoz_dist.errors import InvalidValueError
 from hoz_dist.wire.transport.endpoint import DEFAULT_ENCRYPTED_ENDPOINT, DEFAULT_ENDPOINT
 
@@ -82,8 +83,6 @@ def learner_command(
     it. Two learners with --standby, the same router and the same run folder take turns when one of them fails.
     """
     import logging
-    import signal
-    import threading
 
     # Before the imports that take seconds: these say what is wrong with the options.
     if connect is None:
@@ -119,9 +118,7 @@ def learner_command(
     console.setLevel(logging.WARNING if quiet else logging.INFO)
     console.setFormatter(logging.Formatter("%(asctime)s %(message)s", datefmt="%H:%M:%S"))
     logging.basicConfig(level=logging.INFO, handlers=[console])
-    stop = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: stop.set())
+    stop = stop_on_signals()
     serve(settings, stop)
 
 

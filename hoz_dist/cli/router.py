@@ -5,6 +5,7 @@ from pathlib import Path
 import click
 
 from hoz_dist.cli.connecting import credentials_in, keys_option, shared_memory_option
+from hoz_dist.cli.stopping import stop_on_signals
 from hoz_dist.errors import InvalidValueError
 from hoz_dist.wire.transport.endpoint import DEFAULT_ENCRYPTED_ENDPOINT, DEFAULT_ENDPOINT
 
@@ -30,9 +31,6 @@ def router_command(*, listen: tuple[str, ...], keys: Path | None, shared_memory:
 
     A Zenoh router of another making, `zenohd --config FILE`, does the same.
     """
-    import signal
-    import threading
-
     from hoz_dist.wire.transport.session import open_configured_router, open_router
     from hoz_dist.wire.transport.shared_memory import SharedMemory
 
@@ -40,9 +38,7 @@ def router_command(*, listen: tuple[str, ...], keys: Path | None, shared_memory:
         message = "--config says everything: leave out the other options, or leave out --config."
         raise InvalidValueError(message)
     credentials = credentials_in(keys, ["router"])
-    stop = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: stop.set())
+    stop = stop_on_signals()
     endpoints = listen or (DEFAULT_ENDPOINT if keys is None else DEFAULT_ENCRYPTED_ENDPOINT,)
     if config is not None:
         session = open_configured_router(config)
