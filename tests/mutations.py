@@ -146,6 +146,8 @@ def bad_tensor(data: bytes, _: bytes, rng: random.Random) -> bytes:
                 {"data": raw[: len(raw) // 2]},
                 {"data": raw + bytes(width)},
                 {"data": b"", "shape": [0]},
+                {"data": b"", "shape": [0, 2**63]},
+                {"data": b"", "shape": [2**63, *[0] * (len(shape) - 1)]},
                 {"dtype": rng.choice(("float64", "float32", "float16", "int32", "object", ">f4", "", None))},
                 {"shape": [*shape[::-1], 1]},
                 {"shape": [side + 1 for side in shape]},

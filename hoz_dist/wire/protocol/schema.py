@@ -170,12 +170,15 @@ class Tensor:
         shape, data = fields["shape"], fields["data"]
         if fields["dtype"] != self.dtype:
             raise RejectedError(Reason.DTYPE, f"{where} is {fields['dtype']!r:.40}, not {self.dtype}")
-        if type(shape) is not list or not all(type(side) is int and side >= 0 for side in shape):
-            raise RejectedError(Reason.SHAPE, f"{where} has no valid shape")
+        if type(shape) is not list or len(shape) != self.rank:
+            raise RejectedError(Reason.SHAPE, f"{where} has no shape of {self.rank} axes")
+        if not all(type(side) is int and 0 < side <= self.most for side in shape):
+            # A side of 0 would excuse any other, also one that NumPy cannot hold.
+            raise RejectedError(Reason.SHAPE, f"{where} has a side that is not in 1..{self.most}")
         if type(data) is not bytes:
             raise RejectedError(Reason.TYPE, f"{where}.data is not bytes but {type(data).__name__}")
-        if len(data) != math.prod(shape) * DTYPES[self.dtype].itemsize or len(shape) != self.rank:
-            raise RejectedError(Reason.SHAPE, f"{where} has {len(data)} bytes for the shape {shape[:8]}")
+        if len(data) != math.prod(shape) * DTYPES[self.dtype].itemsize:
+            raise RejectedError(Reason.SHAPE, f"{where} has {len(data)} bytes for the shape {shape}")
         return np.frombuffer(data, DTYPES[self.dtype]).reshape(shape)
 
     def check(self, value: Any, where: str) -> None:

@@ -52,7 +52,7 @@ class ParametersPublisher(Closing):
         self._rejections = rejections or Rejections()
         self._versions = versions or Versions()
         self._publisher = NewestPublisher(session, keys.params)
-        self._queryable = declare_queryable(session, keys.all_params, self._answer)
+        self._queryable = declare_queryable(session, keys.all_params, self._answer, rejections=self._rejections)
 
     def publish(self, epoch: int, version: int, vector: NDArray[np.float32]) -> ParametersHead:
         """Make a version the newest one.

@@ -79,7 +79,9 @@ class Server(Closing):
             keys.all_graphs: self._answer_graph,
             keys.all_plans: self._answer_plan,
         }
-        self._queryables = [declare_queryable(session, key, handle, self._epoch) for key, handle in handlers.items()]
+        self._queryables = [
+            declare_queryable(session, key, handle, self._epoch, self.rejections) for key, handle in handlers.items()
+        ]
         self._reaper = Reaper(self.inbox.put_off_late)
 
     def put_graph(self, graph: SceneGraph | RoomGraph) -> None:

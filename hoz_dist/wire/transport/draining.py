@@ -5,11 +5,15 @@ callbacks are no way out: each has a thread that is not a daemon, and keeps the 
 """
 
 import logging
+import math
 import threading
+import time
 from collections.abc import Callable, Iterable
-from typing import Generic, Protocol, TypeVar
+from typing import Final, Generic, Protocol, TypeVar
 
 _log = logging.getLogger(__name__)
+LOG_EVERY_S: Final = 10.0
+"""A thread logs a traceback at most this often: whoever knows how to cause one must not fill the disk."""
 T = TypeVar("T")
 T_co = TypeVar("T_co", covariant=True)
 
@@ -32,13 +36,15 @@ class Drain(Generic[T]):
 
     Args:
         declared: What the channel belongs to; `close` undeclares it.
-        handle: Handles one sample or query. Should it raise, that is logged and the thread goes on.
+        handle: Handles one sample or query. Should it raise, that is logged now and then and the thread goes on.
         name: Name of the thread.
     """
 
     def __init__(self, declared: Declared[T], handle: Callable[[T], None], name: str) -> None:
         self._declared = declared
         self._handle = handle
+        self._logged_at = -math.inf
+        self._unlogged = 0
         self._thread = threading.Thread(target=self._run, name=f"hoz {name}", daemon=True)
         self._thread.start()
 
@@ -53,4 +59,14 @@ class Drain(Generic[T]):
             try:
                 self._handle(received)
             except Exception:  # noqa: BLE001 - a sender must not be able to end the thread
-                _log.exception("%s: failed to handle a message", self._thread.name)
+                self._log_failure()
+
+    def _log_failure(self) -> None:
+        """Log the exception that is being handled, unless one was logged a moment ago."""
+        now = time.monotonic()
+        if now - self._logged_at < LOG_EVERY_S:
+            self._unlogged += 1
+            return
+        name = self._thread.name
+        _log.exception("%s: failed to handle a message; %d more since the last time", name, self._unlogged)
+        self._logged_at, self._unlogged = now, 0

@@ -10,9 +10,11 @@ from zenoh.handlers import FifoChannel
 
 from hoz_dist.errors import HozError, NotFoundError, UnknownNameError
 from hoz_dist.wire.protocol.codec import encode
+from hoz_dist.wire.protocol.keys import NOBODY
 from hoz_dist.wire.protocol.message import Message
 from hoz_dist.wire.protocol.messages import Busy, Refused
 from hoz_dist.wire.protocol.rejection import Reason, RejectedError, plain
+from hoz_dist.wire.protocol.rejections import Rejections
 from hoz_dist.wire.transport.draining import Drain
 from hoz_dist.wire.transport.shared_memory import SharedMemory
 
@@ -57,7 +59,13 @@ def refusal_of(error: HozError, epoch: int) -> Refused:
     return Refused(reason.value, plain(str(error)), epoch)
 
 
-def declare_queryable(session: Session, key_expr: str, handle: Callable[[Query], None], epoch: int = 0) -> Drain[Query]:
+def declare_queryable(
+    session: Session,
+    key_expr: str,
+    handle: Callable[[Query], None],
+    epoch: int = 0,
+    rejections: Rejections | None = None,
+) -> Drain[Query]:
     """Answer the queries on some keys in a thread.
 
     Args:
@@ -65,14 +73,17 @@ def declare_queryable(session: Session, key_expr: str, handle: Callable[[Query],
         key_expr: Keys that it answers for.
         handle: Answers a query, or keeps it to be answered later. Should it raise, the query is refused.
         epoch: Epoch of the learner, for that refusal.
+        rejections: Where that refusal is counted; None for nowhere.
     """
 
     def handle_or_refuse(query: Query) -> None:
         try:
             handle(query)
         except Exception:
+            detail = "the learner failed to answer; its log says why"
+            if rejections is not None:
+                rejections.count(Reason.INTERNAL, detail, NOBODY)
             with contextlib.suppress(zenoh.ZError):  # it may have been answered already
-                detail = "the learner failed to answer; its log says why"
                 answer(query, "", Refused(Reason.INTERNAL.value, detail, epoch))
             raise
 

@@ -87,6 +87,7 @@ def test_the_server_lives_on_when_an_answer_fails(learner: Server, client: Sessi
     learner.snapshots.status = fail  # type: ignore[assignment]
     (answer,) = ask(client, KEYS.status, timeout_s=5.0)
     assert decode(answer.payload, Refused).reason == "internal"
+    assert learner.rejections.by_reason() == {"internal": 1}
     learner.snapshots.status = samples.status_reply
     (answer,) = ask(client, KEYS.status, timeout_s=5.0)
     assert answer.key == KEYS.status
