@@ -1,6 +1,6 @@
 """What the learner counts and measures: frames, success, lag, and each actor's part in them."""
 
-from collections import OrderedDict, deque
+from collections import Counter, OrderedDict, deque
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any, Final, NamedTuple
@@ -14,7 +14,8 @@ ACTOR_LAG_WINDOW: Final = 32
 RATE_SECONDS: Final = 30
 """Seconds over which frames per second are measured."""
 MAX_ACTORS: Final = 4096
-"""Actors remembered; the one that was silent longest is forgotten first."""
+"""Actor processes remembered. Of the name that has most of them, the one that was silent longest is forgotten first:
+whoever invents incarnations pushes out its own."""
 
 
 class Rate:
@@ -53,7 +54,7 @@ class ActorStatistics:
     """What is known of one actor process."""
 
     rooms: set[str] = field(default_factory=set)
-    """Rooms that its episodes and room graphs were of."""
+    """Rooms that its episodes and room graphs were of; no more than exist, since no message can name another."""
     frames: int = 0
     """Environment steps of its applied gradients."""
     rate: Rate = field(default_factory=Rate)
@@ -98,7 +99,8 @@ class Statistics:
         statistics.last_seen = now
         self.actors.move_to_end(process)
         if len(self.actors) > MAX_ACTORS:
-            self.actors.popitem(last=False)
+            ((most, _),) = Counter(known for known, _ in self.actors).most_common(1)
+            del self.actors[next(known for known in self.actors if known[0] == most)]
         return statistics
 
     def applied(self, actor: str, incarnation: int, frames: int, lag: int, now: float) -> None:

@@ -1,5 +1,9 @@
 import pytest
 
+from hoz_dist.nav.episode import EpisodeResult
+from hoz_dist.nav.rooms import RoomId
+from hoz_dist.wire.protocol.messages import EpisodesPush
+from hoz_dist.wire.protocol.rejection import RejectedError
 from learner.statistics import MAX_ACTORS, SUCCESS_WINDOW, LagSummary, Rate, Statistics
 
 
@@ -55,6 +59,23 @@ def test_actors_are_forgotten_when_there_are_too_many() -> None:
         statistics.actor(f"a{number}", 1, now=float(number))
     assert len(statistics.actors) == MAX_ACTORS
     assert ("a0", 1) not in statistics.actors
+
+
+def test_a_name_that_invents_incarnations_pushes_out_only_its_own() -> None:
+    statistics = Statistics()
+    statistics.applied("honest", 1, 20, lag=0, now=0.0)
+    for incarnation in range(2 * MAX_ACTORS):
+        statistics.actor("mallory", incarnation, now=1.0)
+    assert len(statistics.actors) == MAX_ACTORS
+    assert statistics.actors["honest", 1].frames == 20
+    assert ("mallory", 2 * MAX_ACTORS - 1) in statistics.actors
+
+
+@pytest.mark.parametrize("room", [RoomId("kitchen", 0), RoomId("kitchen", 31), RoomId("cellar", 1)], ids=str)
+def test_the_rooms_of_an_actor_are_rooms_that_exist(room: RoomId) -> None:
+    result = EpisodeResult(room, 0, False, 12, 6, True, 8)
+    with pytest.raises(RejectedError):
+        EpisodesPush(actor="a", incarnation=1, sequence=0, episodes=(result,))
 
 
 def test_the_speed_of_a_process_is_not_that_of_its_predecessor() -> None:
