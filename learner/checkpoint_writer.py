@@ -24,14 +24,22 @@ class CheckpointWriter:
 
     Args:
         folder: The folder of checkpoints.
-        snapshot: Copies the state of the run as it is at a time.
+        snapshot: Copies the state of the run as it is at a time; an `OSError` of it is a save that failed.
         files: How to change the files of the folder.
+        before: Called with the snapshot taken, in the thread that writes, before the checkpoint is; likewise.
     """
 
-    def __init__(self, folder: Path, snapshot: Callable[[float], Checkpoint], files: Files) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        snapshot: Callable[[float], Checkpoint],
+        files: Files,
+        before: Callable[[], None] = lambda: None,
+    ) -> None:
         self._folder = folder
         self._snapshot = snapshot
         self._files = files
+        self._before = before
         self._thread = ThreadPoolExecutor(1, "hoz-checkpoint")
         self._writing: Future[Path] | None = None
         self._due: float | None = None
@@ -60,9 +68,12 @@ class CheckpointWriter:
         if self._writing is None and self._due is not None and now >= self._due:
             self._due = None
             self._keeping, self._keep = self._keep, False
-            self._writing = self._thread.submit(
-                save_checkpoint, self._folder, self._snapshot(now), keep=self._keeping, files=self._files
-            )
+            try:
+                checkpoint = self._snapshot(now)
+            except OSError as error:
+                self._try_again(error, now)
+            else:
+                self._writing = self._thread.submit(self._write, checkpoint, keep=self._keeping)
 
     def abandon(self) -> None:
         """Stop without saving, once the checkpoint that is being written is, or has failed to be."""
@@ -82,13 +93,17 @@ class CheckpointWriter:
         if self._writing is not None:
             self._finish(self._writing, now)
         try:
-            return save_checkpoint(self._folder, self._snapshot(now), keep=self._keep, files=self._files)
+            return self._write(self._snapshot(now), keep=self._keep)
         except OSError as error:
             message = (
                 f"Cannot save the last checkpoint in '{self._folder}' ({error.strerror or error}); "
                 "make room, and run the same command to go on from the one before."
             )
             raise HozError(message) from error
+
+    def _write(self, checkpoint: Checkpoint, *, keep: bool) -> Path:
+        self._before()
+        return save_checkpoint(self._folder, checkpoint, keep=keep, files=self._files)
 
     def _finish(self, writing: "Future[Path]", now: float) -> None:
         self._writing = None
@@ -97,9 +112,12 @@ class CheckpointWriter:
         except DeposedError:
             _log.warning("another learner leads the run by now: the checkpoint was not saved")
         except OSError as error:
-            # Training on and trying again loses less than stopping would.
-            self._outage.failed(error)
-            self._due = now + RETRY_S
-            self._keep |= self._keeping
+            self._try_again(error, now)
         else:
             self._outage.worked()
+
+    def _try_again(self, error: OSError, now: float) -> None:
+        # Training on and trying again loses less than stopping would.
+        self._outage.failed(error)
+        self._due = now + RETRY_S
+        self._keep |= self._keeping

@@ -108,10 +108,12 @@ class Learner:
         self._done_since: float | None = None
         self._updates_disk = Outage(_log, "cannot record updates (%s); training on", "updates are recorded again")
         self._scalars_disk = Outage(_log, "cannot log to TensorBoard (%s); training on", "logging to TensorBoard again")
-        self._checkpoints = CheckpointWriter(run.folder.checkpoints, self._snapshot, run.leadership)
         with ExitStack() as stack:
             self._updates = UpdateLog(run.updates)
             stack.callback(self._updates.close)
+            self._checkpoints = CheckpointWriter(
+                run.folder.checkpoints, self._snapshot, run.leadership, self._updates.sync
+            )
             self._scalars = ScalarRecorder(run.folder.tensorboard, core.statistics.frames)
             stack.callback(self._scalars.close)
             stack.callback(self._save_last)
@@ -205,12 +207,10 @@ class Learner:
     def _publish_parameters(self) -> None:
         self._parameters.publish(self._core.epoch, self._core.version, self._core.parameters)
 
-    def _flush_updates(self) -> None:
-        _write(self._updates.flush, self._updates_disk)
-
     def _snapshot(self, now: float) -> Checkpoint:
-        # The record must have every update that a checkpoint has: the next learner's begins with the version after.
-        self._flush_updates()
+        # The record must have every update that a checkpoint has: the next learner's begins with the version after. It
+        # is on the disk before the checkpoint is: the thread that writes waits for that.
+        self._updates.flush()
         return self._core.snapshot(now)
 
     def _leads(self, now: float) -> bool:
@@ -245,7 +245,7 @@ class Learner:
 
     def _record(self, now: float) -> None:
         status = self._core.status(now)
-        self._flush_updates()
+        _write(self._updates.flush, self._updates_disk)
         _write(lambda: self._scalars.record(status), self._scalars_disk)
         success, lag = status["success"]["overall"], status["lag"]
         _log.info(

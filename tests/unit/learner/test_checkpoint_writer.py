@@ -1,4 +1,6 @@
+import errno
 import logging
+import os
 import threading
 from collections.abc import Iterator
 from dataclasses import replace
@@ -23,10 +25,17 @@ class Run:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.leadership = leading(folder)
-        self.writer = CheckpointWriter(folder, self.snapshot, self.leadership)
+        self.writer = CheckpointWriter(folder, self.snapshot, self.leadership, self.before)
+        self.record_fails = self.sync_fails = False
         self._checkpoint = LearnerCore(CONFIG, vector(0)).snapshot(0.0)
 
+    def before(self) -> None:
+        if self.sync_fails:
+            raise OSError(errno.EIO, os.strerror(errno.EIO))
+
     def snapshot(self, now: float) -> Checkpoint:
+        if self.record_fails:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         return replace(self._checkpoint, version=int(now))
 
     def versions(self) -> list[int]:
@@ -88,6 +97,27 @@ def test_a_failed_save_is_said_once_and_soon_tried_again(run: Run, caplog: pytes
     run.writer.close(20.0)
 
 
+@pytest.mark.parametrize("what", ["record_fails", "sync_fails"])
+def test_without_the_record_of_its_updates_no_checkpoint_is_saved(
+    run: Run, what: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level(logging.INFO)
+    setattr(run, what, True)
+    for now in (1.0, 1.0 + RETRY_S, 1.0 + 2 * RETRY_S):
+        if now == 1.0:
+            run.writer.save(now, keep=True)
+        else:
+            run.writer.poll(now)
+        run.settle(now)
+    assert run.versions() == []
+    setattr(run, what, False)
+    run.writer.poll(50.0)
+    run.settle(50.0)
+    assert (run.versions(), run.kept()) == ([50], [50])
+    assert [record.levelname for record in caplog.records] == ["WARNING", "INFO"]
+    run.writer.close(60.0)
+
+
 def test_what_was_to_be_kept_and_failed_is_kept_at_the_stop(run: Run) -> None:
     with full_disk(1000):
         run.writer.save(1.0, keep=True)
@@ -99,6 +129,14 @@ def test_what_was_to_be_kept_and_failed_is_kept_at_the_stop(run: Run) -> None:
 def test_a_last_checkpoint_that_cannot_be_written_is_said_in_one_sentence(run: Run) -> None:
     with full_disk(1000), pytest.raises(HozError, match=r"Cannot save the last checkpoint in '.*' \(.+\); make room"):
         run.writer.close(1.0)
+
+
+@pytest.mark.parametrize("what", ["record_fails", "sync_fails"])
+def test_without_the_record_of_its_updates_the_last_checkpoint_is_not_saved_either(run: Run, what: str) -> None:
+    setattr(run, what, True)
+    with pytest.raises(HozError, match="Cannot save the last checkpoint"):
+        run.writer.close(1.0)
+    assert run.versions() == []
 
 
 def test_a_deposed_learner_saves_nothing_and_does_not_try_again(run: Run, caplog: pytest.LogCaptureFixture) -> None:

@@ -1,3 +1,5 @@
+import errno
+import os
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -52,6 +54,53 @@ def test_updates_that_a_full_disk_did_not_take_are_written_later_and_none_twice(
     log.flush()
     log.close()
     assert read_updates(path) == [record(sequence) for sequence in range(5)]
+
+
+def test_lines_that_the_system_lost_are_written_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = begun(tmp_path / "epoch-0001.jsonl")
+    log = UpdateLog(path)
+    log.write(record(0))
+    log.flush()
+    log.sync()
+    safe = path.stat().st_size
+    log.write(record(1))
+    log.flush()
+
+    def lose(_: int) -> None:
+        os.truncate(path, safe)
+        raise OSError(errno.EDQUOT, os.strerror(errno.EDQUOT))
+
+    with monkeypatch.context() as later:
+        later.setattr("learner.recorder.os.fsync", lose)
+        with pytest.raises(OSError, match="quota"):
+            log.sync()
+    log.write(record(2))
+    log.flush()
+    log.sync()
+    assert not log._lines
+    log.close()
+    assert read_updates(path) == [record(0), record(1), record(2)]
+
+
+def test_lines_that_come_while_the_disk_is_waited_for_stay(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = begun(tmp_path / "epoch-0001.jsonl")
+    log = UpdateLog(path)
+
+    def meanwhile(_: int) -> None:
+        log.write(record(1))
+        log.flush()
+        log.write(record(2))
+
+    log.write(record(0))
+    log.flush()
+    with monkeypatch.context() as later:
+        later.setattr("learner.recorder.os.fsync", meanwhile)
+        log.sync()
+    assert bytes(log._lines).decode() == record(1).to_line() + record(2).to_line()
+    log.flush()
+    log.sync()
+    log.close()
+    assert read_updates(path) == [record(0), record(1), record(2)]
 
 
 def test_a_record_that_cannot_be_written_is_said_in_one_sentence(tmp_path: Path) -> None:
