@@ -24,6 +24,7 @@ from hoz_dist.sim.view_source import ViewSource
 from hoz_dist.sim.view_store import ViewStore
 from hoz_dist.waiting import StoppedError
 from hoz_dist.wire.protocol.graphs import scene_graph_of
+from hoz_dist.wire.protocol.message import MAX_EPISODES
 from hoz_dist.wire.protocol.messages import Accepted, Refused, SceneGraphReply
 from hoz_dist.wire.protocol.rejection import Reason
 from workers.collector import Collector
@@ -33,8 +34,10 @@ from workers.preparation import RoomPreparation
 _log = logging.getLogger(__name__)
 UPDATES_PER_ROOM: Final = 2
 """Updates between two rooms that are got ready: training begins with the first room, and soon has all."""
-REPORT_UPDATES: Final = 5
-"""Updates between two reports of finished episodes."""
+REPORT_ROLLOUTS: Final = 5
+"""Rollouts between two reports of finished episodes, whatever became of their gradients."""
+REPORT_EPISODES: Final = MAX_EPISODES // 2
+"""Finished episodes that are reported at once."""
 _PASSING: Final = frozenset({Reason.EPOCH, Reason.STALE, Reason.INTERNAL})
 """Reasons of refusals that the next gradient, computed on newer parameters, does not have."""
 
@@ -47,10 +50,22 @@ class RunOverError(Exception):
 class _Report:
     """What happened since the last report."""
 
+    rollouts: int = 0
     updates: int = 0
+    """Gradients that the learner accepted."""
     losses: Counter[str] = field(default_factory=Counter)
-    """Sums of the terms of the loss."""
+    """Sums of the terms of the loss over them."""
     episodes: list[EpisodeResult] = field(default_factory=list)
+
+    @property
+    def is_due(self) -> bool:
+        """Whether it is time to send it."""
+        return self.rollouts >= REPORT_ROLLOUTS or len(self.episodes) >= REPORT_EPISODES
+
+    @property
+    def mean_losses(self) -> dict[str, float]:
+        """Means of the terms of the loss; empty, which the wire takes for 0, if no gradient was accepted."""
+        return {name: total / self.updates for name, total in self.losses.items()}
 
 
 class Actor:
@@ -107,7 +122,7 @@ class Actor:
                 self._refresh_graphs()
                 self._update()
                 updates += 1
-                if self._report.updates == REPORT_UPDATES:
+                if self._report.is_due:
                     self._send_report()
             _log.info("stopped")
         except StoppedError:
@@ -157,6 +172,7 @@ class Actor:
                 self._push_room_graph(graph)
         self._collector.parameters.load(parameters.vector)
         update = self._collector.roll_out()
+        self._report.rollouts += 1
         self._report.episodes += update.finished
         if not np.isfinite(update.gradient).all():
             _log.warning("a gradient is not finite; it is dropped")
@@ -177,7 +193,6 @@ class Actor:
 
     def _send_report(self) -> None:
         report, self._report = self._report, _Report()
-        losses = {name: total / report.updates for name, total in report.losses.items()}
-        match self._link.push_episodes(report.episodes, losses):
+        match self._link.push_episodes(report.episodes, report.mean_losses):
             case Refused(reason, detail) if reason != Reason.FINISHED:
                 _log.warning("a report of %d episodes was refused (%s): %s", len(report.episodes), reason, detail)

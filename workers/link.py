@@ -186,20 +186,28 @@ class LearnerLink(Closing):
         return self._pusher.push(self._keys.grads(self._actor), push)
 
     def push_episodes(self, episodes: Sequence[EpisodeResult], losses: Mapping[str, float]) -> Accepted | Refused:
-        """Push how episodes ended and how the training goes.
+        """Push how episodes ended and how the training goes; more than a message holds go in several.
 
         Args:
             episodes: Results, in the order in which the episodes ended.
-            losses: Means since the last push of ``policy_loss``, ``value_loss``, ``entropy`` and ``scene_loss``.
+            losses: Means since the last push of ``policy_loss``, ``value_loss``, ``entropy`` and ``scene_loss``; 0 for
+                what is left out.
+
+        Returns:
+            The answer to the last message, or the first refusal, after which nothing more is pushed.
         """
-        push = EpisodesPush(
-            actor=self._actor,
-            incarnation=self._incarnation,
-            sequence=self._next(EpisodesPush),
-            episodes=tuple(episodes[:MAX_EPISODES]),
-            **losses,
-        )
-        return self._pusher.push(self._keys.rollouts(self._actor), push)
+        for first in range(0, max(len(episodes), 1), MAX_EPISODES):
+            push = EpisodesPush(
+                actor=self._actor,
+                incarnation=self._incarnation,
+                sequence=self._next(EpisodesPush),
+                episodes=tuple(episodes[first : first + MAX_EPISODES]),
+                **losses,
+            )
+            reply = self._pusher.push(self._keys.rollouts(self._actor), push)
+            if isinstance(reply, Refused):
+                break
+        return reply
 
     def push_room_graph(self, graph: RoomGraph) -> Accepted | Refused:
         """Push a room graph; after it is accepted, `scene_graphs` holds a scene graph that has the room.

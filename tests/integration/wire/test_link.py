@@ -17,7 +17,8 @@ from hoz_dist.nav.categories import TARGETS
 from hoz_dist.waiting import StoppedError
 from hoz_dist.wire.client import epochs
 from hoz_dist.wire.client.epochs import AnotherRunError
-from hoz_dist.wire.protocol.messages import Accepted, ConfigReply, Push, PushReply, Refused
+from hoz_dist.wire.protocol.message import MAX_EPISODES
+from hoz_dist.wire.protocol.messages import Accepted, ConfigReply, EpisodesPush, Push, PushReply, Refused
 from hoz_dist.wire.serving.parameters import ParametersPublisher
 from hoz_dist.wire.serving.server import Server
 from hoz_dist.wire.serving.snapshots import Snapshots
@@ -76,6 +77,22 @@ def test_each_acknowledged_push_is_in_the_journal_and_refused_ones_are_not(
         ("gradient", 2, 8),
         ("episodes", 0, 6),
     ]
+
+
+def test_episodes_that_do_not_fit_into_a_message_go_in_several(sessions: tuple[Session, Session]) -> None:
+    pushed = []
+
+    def decide(push: Push) -> PushReply:
+        assert isinstance(push, EpisodesPush)
+        pushed.append((push.sequence, len(push.episodes), push.entropy))
+        return Refused("internal", "the disk is full", 1) if push.sequence == 3 else Accepted(1, 6)
+
+    episodes = [samples.EPISODE] * (MAX_EPISODES + 1)
+    with learner(sessions[0]) as (server, _), answering(server.inbox, decide), joined(sessions[1]) as link:
+        assert isinstance(link.push_episodes([], {}), Accepted)
+        assert isinstance(link.push_episodes(episodes, {"entropy": 1.5}), Accepted)
+        assert isinstance(link.push_episodes(episodes, {}), Refused)
+    assert pushed == [(0, 0, 0.0), (1, MAX_EPISODES, 1.5), (2, 1, 1.5), (3, MAX_EPISODES, 0.0)]
 
 
 def test_a_learner_that_fails_once_or_forgets_is_told_a_room_graph_again(
