@@ -100,19 +100,21 @@ class ParametersPublisher(Closing):
 
         Args:
             name: Number of the shard, the last part of the key.
-            asked: ``reader``: who asks; ``epoch`` and ``version``: of what, the newest when not given.
+            asked: ``reader``: who asks; ``epoch`` and ``version``: of what; for shard 0 the newest when not given.
 
         Raises:
-            RejectedError: The version is gone, or the question cannot be understood.
+            RejectedError: The version is gone, there is no such shard, or the question cannot be understood.
         """
         number, reader, now = _number("the shard", name), asked.get("reader", ""), time.monotonic()
         if not NAME_PATTERN.fullmatch(reader):
             raise RejectedError(Reason.NAME, f"the reader's name is not well formed: {reader!r:.80}")
         if "version" in asked:
             stamp = (_number("the epoch", asked.get("epoch", "")), _number("the version", asked["version"]))
-            parameters = self._versions.go_on(reader, stamp, now)
+            parameters = self._versions.go_on(reader, stamp, number, now)
             if parameters is None:
                 raise RejectedError(Reason.GONE, f"version {stamp[1]} of epoch {stamp[0]} is not kept any more")
+        elif number > 0:
+            raise RejectedError(Reason.RANGE, f"shard {number} of no version was asked for; only 0 is the newest's")
         else:
             begun = self._versions.begin(reader, now)
             if begun is None:

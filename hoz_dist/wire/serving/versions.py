@@ -10,22 +10,29 @@ MOST_READERS: Final = 1024
 MOST_BYTES: Final = 512 * 1024 * 1024
 """Of all versions that are kept, the newest among them."""
 EXPIRES_S: Final = 120.0
-"""Time after which a reader that asked for nothing more is forgotten; longer than a slow link takes for a shard."""
+"""Time after which a reader that did not get on is forgotten; longer than a slow link takes for a shard."""
 YIELDS_S: Final = 5.0
 """Time after which such a reader makes room for another one when there is none."""
+HELD_S: Final = 60.0
+"""Time for which a version is kept in any case while its readers get on; then it makes room when there is none."""
 
 
 class _Reading(NamedTuple):
     parameters: Parameters
+    began: float
+    """When the reader asked for the first shard."""
+    shard: int
+    """The last shard that it asked for."""
     time: float
-    """When the reader last asked."""
+    """When it asked for that shard for the first time."""
 
 
 class Versions:
     """The newest version and those being read, each array once; may be used from several threads.
 
-    A reader is begun with the newest version and can then be sure to read all of it. So a slow reader neither gets
-    parts of two versions nor has to begin again, however fast the learner is.
+    A reader is begun with the newest version and can then read all of it, as long as it gets on and there is room. So a
+    slow reader neither gets parts of two versions nor has to begin again, however fast the learner is. Nobody can keep
+    the others out: what was held longest makes room.
 
     Args:
         most_readers: Largest number of readers.
@@ -37,11 +44,11 @@ class Versions:
         self._most_bytes = most_bytes
         self._lock = threading.Lock()
         self._readings: OrderedDict[str, _Reading] = OrderedDict()
-        """By reader, the one that asked longest ago first."""
+        """By reader, the one that got on longest ago first."""
         self.newest: Parameters | None = None
 
     def begin(self, reader: str, now: float) -> Parameters | None:
-        """Return the newest version and keep it for a reader; None when nothing more can be kept.
+        """Return the newest version and keep it for a reader of shard 0; None when nothing more can be kept.
 
         Raises:
             LookupError: There are no parameters yet.
@@ -50,22 +57,29 @@ class Versions:
             newest = self.newest
             if newest is None:
                 raise LookupError
-            self._readings.pop(reader, None)
             self._expire(now, EXPIRES_S)
             if not self._has_room():
                 self._expire(now, YIELDS_S)
-            if not self._has_room():
-                return None
-            self._readings[reader] = _Reading(newest, now)
+            while not self._has_room():
+                if not self._drop_the_oldest(now):
+                    # Who begins again must not get its own room back before the others had a chance.
+                    self._readings.pop(reader, None)
+                    return None
+            self._readings.pop(reader, None)  # to be the last one
+            self._readings[reader] = _Reading(newest, now, 0, now)
             return newest
 
-    def go_on(self, reader: str, stamp: tuple[int, int], now: float) -> Parameters | None:
-        """Return the version of which a reader has read a part; None when it is not kept any more."""
+    def go_on(self, reader: str, stamp: tuple[int, int], shard: int, now: float) -> Parameters | None:
+        """Return the version of which a reader has read a part; None when it is not kept any more.
+
+        A shard that it asked for before, or that there is not, does not count as getting on.
+        """
         with self._lock:
             reading = self._readings.get(reader)
             if reading is not None and reading.parameters.head.stamp == stamp:
-                self._readings[reader] = _Reading(reading.parameters, now)
-                self._readings.move_to_end(reader)
+                if reading.shard < shard < reading.parameters.head.shards:
+                    self._readings[reader] = reading._replace(shard=shard, time=now)
+                    self._readings.move_to_end(reader)
                 return reading.parameters
             newest = self.newest
             return newest if newest is not None and newest.head.stamp == stamp else None
@@ -89,8 +103,18 @@ class Versions:
         return sum({one.head.stamp: one.vector.nbytes for one in kept}.values())
 
     def _expire(self, now: float, after_s: float) -> None:
+        """Forget the readers that did not get on for so long."""
         while self._readings:
             reader, reading = next(iter(self._readings.items()))
             if now - reading.time < after_s:
                 break
             del self._readings[reader]
+
+    def _drop_the_oldest(self, now: float) -> bool:
+        """Forget the readers of the version that is held longest; False when none is held long enough."""
+        oldest = min(self._readings.values(), key=lambda reading: reading.began, default=None)
+        if oldest is None or now - oldest.began < HELD_S:
+            return False
+        for reader in [name for name, one in self._readings.items() if one.parameters is oldest.parameters]:
+            del self._readings[reader]
+        return True

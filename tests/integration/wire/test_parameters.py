@@ -13,11 +13,13 @@ from hoz_dist.wire.protocol.codec import decode
 from hoz_dist.wire.protocol.message import SHARD_ELEMENTS
 from hoz_dist.wire.protocol.messages import (
     ParametersHead,
+    Refused,
     SceneGraphReply,
 )
 from hoz_dist.wire.serving.parameters import ParametersPublisher
 from hoz_dist.wire.serving.server import Server
 from hoz_dist.wire.serving.snapshots import Snapshots
+from hoz_dist.wire.serving.versions import Versions
 from hoz_dist.wire.transport.ask import ask
 from hoz_dist.wire.transport.publishing import NewestSubscriber
 from hoz_dist.wire.transport.session import Session, open_client, open_router
@@ -96,6 +98,21 @@ def test_parameters_of_several_shards_are_never_mixed(learner: Server, client: S
         stop.set()
         thread.join(WAIT_S)
     assert stamps == sorted(stamps)
+
+
+def test_who_does_not_begin_with_the_first_shard_is_refused_and_nothing_is_kept(
+    learner: Server, client: Session
+) -> None:
+    versions = Versions()
+    with ParametersPublisher(learner.session, KEYS, learner.rejections, versions) as publisher:
+        publisher.publish(1, 0, np.zeros(2 * SHARD_ELEMENTS, np.float32))
+        for question in ("1?reader=a", "7?reader=b", "2?reader=c;epoch=1;version=0"):
+            (answer,) = ask(client, f"{KEYS.params}/{question}", timeout_s=5.0)
+            assert decode(answer.payload, Refused).reason == "range"
+        vector = np.ones(2 * SHARD_ELEMENTS, np.float32)
+        publisher.publish(1, 1, vector)
+        assert versions.kept_bytes() == vector.nbytes
+    assert learner.rejections.by_reason() == {"range": 3}
 
 
 def test_parameters_never_run_backwards_but_a_new_epoch_may_begin_lower(learner: Server, client: Session) -> None:

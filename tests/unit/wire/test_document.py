@@ -15,7 +15,7 @@ from hoz_dist.wire.protocol.messages import ParametersHead, ParametersShard
 from hoz_dist.wire.protocol.rejection import Reason
 from hoz_dist.wire.protocol.rejections import LOG_EVERY_S, MOST_LINES
 from hoz_dist.wire.serving.inbox import LONGEST_WAIT_S, MOST_WAITING, MOST_WAITING_BYTES
-from hoz_dist.wire.serving.versions import EXPIRES_S, MOST_BYTES, MOST_READERS
+from hoz_dist.wire.serving.versions import EXPIRES_S, HELD_S, MOST_BYTES, MOST_READERS, YIELDS_S
 from learner.deduplication import MAX_SENDERS, WINDOW
 from tests.wire_examples import EXAMPLES
 
@@ -76,7 +76,9 @@ def test_the_documented_limits_are_those_of_the_code() -> None:
     assert f"shards of {SHARD_ELEMENTS:,} values (512 KiB)" in DOCUMENT
     assert f"{MOST_WAITING} pushes and {MOST_WAITING_BYTES >> 20} MiB wait at the learner" in DOCUMENT
     assert f"one that waits {LONGEST_WAIT_S:g} s" in DOCUMENT
-    assert f"keeps a version {EXPIRES_S:g} s after its reader asked\nlast" in DOCUMENT
+    assert f"for {EXPIRES_S:g} s after the reader got on last" in DOCUMENT
+    assert f"did not get on for {YIELDS_S:g} s" in DOCUMENT
+    assert f"began {HELD_S:g} s ago" in DOCUMENT
     assert f"at most {MOST_READERS} readers and {MOST_BYTES >> 20} MiB" in DOCUMENT
     assert f"{FIRST_TRY_S:g} s at first" in DOCUMENT
     assert f"up to {LONGER_TRIES * FIRST_TRY_S:g} s" in DOCUMENT

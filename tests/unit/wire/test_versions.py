@@ -1,16 +1,21 @@
+import dataclasses
+
 import numpy as np
 import pytest
 
+from hoz_dist.wire.protocol.message import SHARD_ELEMENTS
 from hoz_dist.wire.protocol.parameters import Parameters, head_of
-from hoz_dist.wire.serving.versions import EXPIRES_S, YIELDS_S, Versions
+from hoz_dist.wire.serving.versions import EXPIRES_S, HELD_S, YIELDS_S, Versions
 
-SIZE = 1000
-BYTES = 4 * SIZE
+SHARDS = 100
+BYTES = 4000
 
 
 def version(number: int) -> Parameters:
-    vector = np.full(SIZE, number, np.float32)
-    return Parameters(head_of(1, number, vector), vector)
+    """A version that says that it has many shards, though the vector is short."""
+    vector = np.full(BYTES // 4, number, np.float32)
+    head = head_of(1, number, vector)
+    return Parameters(dataclasses.replace(head, size=SHARDS * SHARD_ELEMENTS, shards=SHARDS), vector)
 
 
 def test_a_reader_keeps_the_version_that_it_began_with() -> None:
@@ -21,12 +26,12 @@ def test_a_reader_keeps_the_version_that_it_began_with() -> None:
     assert versions.begin("slow", 0.0) is first
     for number in range(2, 50):
         versions.newest = version(number)
-    assert versions.go_on("slow", (1, 1), 1.0) is first
+    assert versions.go_on("slow", (1, 1), 1, 1.0) is first
     assert versions.kept_bytes() == 2 * BYTES, "the versions in between are not kept"
     versions.end("slow")
     assert versions.kept_bytes() == BYTES
-    assert versions.go_on("slow", (1, 1), 2.0) is None
-    assert versions.go_on("slow", (1, 49), 2.0) is versions.newest
+    assert versions.go_on("slow", (1, 1), 2, 2.0) is None
+    assert versions.go_on("slow", (1, 49), 2, 2.0) is versions.newest
 
 
 def test_readers_of_one_version_share_it_and_one_that_begins_again_lets_go_of_it() -> None:
@@ -47,14 +52,14 @@ def test_a_reader_that_asks_for_nothing_more_is_forgotten() -> None:
     versions.begin("dead", 0.0)
     versions.newest = version(2)
     versions.begin("other", EXPIRES_S - 1)
-    assert versions.go_on("dead", (1, 1), EXPIRES_S - 1) is not None
+    assert versions.go_on("dead", (1, 1), 1, EXPIRES_S - 1) is not None
     versions.newest = version(3)
     versions.begin("third", 2 * EXPIRES_S)
-    assert versions.go_on("dead", (1, 1), 2 * EXPIRES_S) is None
+    assert versions.go_on("dead", (1, 1), 2, 2 * EXPIRES_S) is None
     assert versions.kept_bytes() == BYTES
 
 
-def test_memory_is_bounded_and_those_who_read_on_are_never_cut_off() -> None:
+def test_memory_is_bounded_and_those_who_get_on_are_not_cut_off_at_once() -> None:
     versions = Versions(most_bytes=3 * BYTES)
     for number in range(1, 4):
         versions.newest = version(number)
@@ -63,10 +68,10 @@ def test_memory_is_bounded_and_those_who_read_on_are_never_cut_off() -> None:
     assert versions.kept_bytes() == 4 * BYTES
     assert versions.begin("late", 1.0) is None, "there is no room: ask again"
     for number in (2, 3):
-        assert versions.go_on(f"r{number}", (1, number), YIELDS_S) is not None
+        assert versions.go_on(f"r{number}", (1, number), 1, YIELDS_S) is not None
     assert versions.begin("late", YIELDS_S) is versions.newest, "the one that had stopped made room"
-    assert versions.go_on("r1", (1, 1), YIELDS_S) is None
-    assert versions.go_on("r2", (1, 2), YIELDS_S) is not None
+    assert versions.go_on("r1", (1, 1), 1, YIELDS_S) is None
+    assert versions.go_on("r2", (1, 2), 2, YIELDS_S) is not None
 
 
 def test_the_number_of_readers_is_bounded() -> None:
@@ -77,3 +82,70 @@ def test_the_number_of_readers_is_bounded() -> None:
     assert versions.begin("c", 0.0) is None
     versions.end("a")
     assert versions.begin("c", 0.0) is not None
+
+
+@pytest.mark.parametrize("shard", [0, 1, SHARDS, 2**60])
+def test_asking_for_the_same_shard_or_for_one_that_there_is_not_is_not_getting_on(shard: int) -> None:
+    versions = Versions(most_bytes=2 * BYTES)
+    for number in (1, 2):
+        versions.newest = version(number)
+        versions.begin(f"r{number}", 0.0)
+        assert versions.go_on(f"r{number}", (1, number), 1, 0.0) is not None
+    versions.newest = version(3)
+    for second in range(1, int(YIELDS_S)):
+        for number in (1, 2):
+            assert versions.go_on(f"r{number}", (1, number), shard, second) is not None, "it is answered"
+        assert versions.begin("late", second) is None
+    assert versions.begin("late", YIELDS_S) is versions.newest
+
+
+def test_nobody_is_kept_out_for_ever_by_those_who_get_on_slowly() -> None:
+    versions = Versions(most_bytes=3 * BYTES)
+    for number in range(1, 4):
+        versions.newest = version(number)
+        assert versions.begin(f"r{number}", float(number)) is not None
+    versions.newest = version(4)
+    for second in range(4, int(HELD_S) + 1):
+        for number in range(1, 4):
+            assert versions.go_on(f"r{number}", (1, number), second, second) is not None
+        assert versions.begin("late", second) is None
+    assert versions.begin("late", HELD_S + 1) is versions.newest
+    assert versions.go_on("r1", (1, 1), 62, HELD_S + 1) is None, "the one that took longest begins again"
+    for number in (2, 3):
+        assert versions.go_on(f"r{number}", (1, number), 62, HELD_S + 1) is not None, "the others go on"
+    assert versions.kept_bytes() == 3 * BYTES
+
+
+def test_a_slow_reader_goes_on_for_as_long_as_there_is_room() -> None:
+    versions = Versions(most_bytes=3 * BYTES)
+    versions.newest = first = version(1)
+    versions.begin("slow", 0.0)
+    for shard in range(1, SHARDS):
+        versions.newest = version(1 + shard)
+        versions.begin("fast", 60.0 * shard)
+        assert versions.go_on("slow", (1, 1), shard, 60.0 * shard) is first
+        versions.end("fast")
+
+
+def test_readers_without_end_make_room_as_well() -> None:
+    versions = Versions(most_readers=2)
+    versions.newest = version(1)
+    for reader in ("a", "b"):
+        versions.begin(reader, 0.0)
+    for second in range(1, int(HELD_S)):
+        for reader in ("a", "b"):
+            versions.go_on(reader, (1, 1), second, second)
+        assert versions.begin("c", second) is None
+    assert versions.begin("c", HELD_S) is versions.newest
+    assert versions.go_on("a", (1, 1), 61, HELD_S) is not None, "it is the newest all the same"
+
+
+def test_who_begins_again_and_again_does_not_keep_the_others_out() -> None:
+    versions = Versions(most_bytes=2 * BYTES)
+    for number in (1, 2):
+        versions.newest = version(number)
+        versions.begin(f"r{number}", 0.0)
+    versions.newest = version(3)
+    assert versions.begin("late", 1.0) is None
+    assert versions.begin("r1", 1.0) is None, "its own version does not make room for it alone"
+    assert versions.begin("late", 1.0) is versions.newest
