@@ -1,6 +1,7 @@
 """The router files that are deployed, opened by real Zenoh routers."""
 
 import json
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
@@ -8,7 +9,9 @@ import pytest
 import zenoh
 
 from hoz_dist.cli.main import run
-from hoz_dist.wire.transport.credentials import ROUTER_FILE, load_credentials
+from hoz_dist.errors import InvalidValueError, NotFoundError
+from hoz_dist.security.authority import Authority
+from hoz_dist.wire.transport.credentials import CERTIFICATE_FILE, KEY_FILE, ROUTER_FILE, load_credentials
 from hoz_dist.wire.transport.session import is_connected, open_client, open_configured_router
 from hoz_dist.wire.transport.settings import router_settings
 
@@ -68,3 +71,27 @@ def test_generated_file_has_the_settings_of_every_router(authority: Path) -> Non
     config = zenoh.Config.from_file(file)
     assert json.loads(config.get_json("access_control/default_permission")) == "deny"
     assert json.loads(config.get_json("transport/link/tls/enable_mtls")) is True
+
+
+def test_a_key_that_others_can_read_is_refused(authority: Path, free_port: int) -> None:
+    router = issue(authority, "router", "main", "--listen", f"tls/127.0.0.1:{free_port}")
+    (router / KEY_FILE).chmod(0o644)
+    with pytest.raises(InvalidValueError, match=f"Others can read the private key '{router / KEY_FILE}'"):
+        open_configured_router(router / ROUTER_FILE)
+
+
+def test_a_key_that_has_expired_is_refused(authority: Path, free_port: int) -> None:
+    router = issue(authority, "router", "main", "--listen", f"tls/127.0.0.1:{free_port}")
+    last_year = datetime.now(UTC) - timedelta(days=365)
+    pair = Authority.create().issue("router-main", ("127.0.0.1",), timedelta(days=1), last_year)
+    (router / CERTIFICATE_FILE).write_bytes(pair.certificate_pem)
+    with pytest.raises(InvalidValueError, match=f"The key in '{router}' expired on"):
+        open_configured_router(router / ROUTER_FILE)
+
+
+@pytest.mark.parametrize("name", [CERTIFICATE_FILE, KEY_FILE])
+def test_a_file_of_the_key_that_is_missing_is_named(authority: Path, free_port: int, name: str) -> None:
+    router = issue(authority, "router", "main", "--listen", f"tls/127.0.0.1:{free_port}")
+    (router / name).unlink()
+    with pytest.raises(NotFoundError, match=f"There is no '{router / name}'"):
+        open_configured_router(router / ROUTER_FILE)

@@ -103,13 +103,37 @@ def load_credentials(folder: Path | str, roles: Collection[str] = ROLES) -> Cred
     if missing:
         message = f"The key folder '{folder}' lacks {', '.join(missing)}; make one with `hoz-dist keys issue`."
         raise NotFoundError(message)
-    _check_private(folder / KEY_FILE)
-    role, name, certificate = _identity(folder / CERTIFICATE_FILE)
-    _check_time(certificate, folder)
+    certificate = check_key(folder / CERTIFICATE_FILE, folder / KEY_FILE)
+    role, name = _identity(certificate, folder / CERTIFICATE_FILE)
     if role not in roles:
         message = f"The key in '{folder}' is of the {role} '{name}'; this needs one of the role {' or '.join(roles)}."
         raise InvalidValueError(message)
     return Credentials(role, name, folder, certificate.not_valid_after_utc)
+
+
+def check_key(certificate: Path, key: Path) -> x509.Certificate:
+    """Check that a certificate is valid now and that nobody else can read its private key.
+
+    Args:
+        certificate: File of the certificate.
+        key: File of the private key.
+
+    Returns:
+        The certificate.
+
+    Raises:
+        NotFoundError: A file is missing.
+        DamagedFileError: The certificate cannot be read.
+        InvalidValueError: Others can read the private key, or the certificate is expired or not valid yet.
+    """
+    for path in (certificate, key):
+        if not path.is_file():
+            message = f"There is no '{path}'; make one with `hoz-dist keys issue`."
+            raise NotFoundError(message)
+    _check_private(key)
+    found = _read_certificate(certificate)
+    _check_time(found, certificate.parent)
+    return found
 
 
 def _check_private(key: Path) -> None:
@@ -124,19 +148,27 @@ def _check_private(key: Path) -> None:
         raise InvalidValueError(message)
 
 
-def _identity(path: Path) -> tuple[str, str, x509.Certificate]:
-    """Return role, name and certificate."""
+def _read_certificate(path: Path) -> x509.Certificate:
     try:
-        certificate = x509.load_pem_x509_certificate(path.read_bytes())
-        names = certificate.subject.get_attributes_for_oid(NameOID.COMMON_NAME)
+        return x509.load_pem_x509_certificate(path.read_bytes())
     except ValueError as error:
         message = f"'{path}' is not a certificate; issue the key anew with `hoz-dist keys issue`."
         raise DamagedFileError(message) from error
+
+
+def _identity(certificate: x509.Certificate, path: Path) -> tuple[str, str]:
+    """Return role and name.
+
+    Args:
+        certificate: Who it is.
+        path: Its file, for the error.
+    """
+    names = certificate.subject.get_attributes_for_oid(NameOID.COMMON_NAME)
     role, _, name = str(names[0].value if names else "").partition("-")
     if role not in ROLES or not name:
         message = f"The certificate '{path}' names no role of hoz-dist; issue one with `hoz-dist keys issue`."
         raise DamagedFileError(message)
-    return role, name, certificate
+    return role, name
 
 
 def _check_time(certificate: x509.Certificate, folder: Path) -> None:

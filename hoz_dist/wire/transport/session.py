@@ -74,15 +74,17 @@ def open_configured_router(path: Path) -> Session:
         path: A configuration of Zenoh, JSON5.
 
     Raises:
-        NotFoundError: The file does not exist.
-        DamagedFileError: It is no configuration of Zenoh.
-        InvalidValueError: It is not that of a router.
+        NotFoundError: The file, or one of the router's key that it names, does not exist.
+        DamagedFileError: It is no configuration of Zenoh, or the router's certificate cannot be read.
+        InvalidValueError: It is not that of a router, others can read the router's private key, or the certificate is
+            not valid now.
         ConnectionFailedError: An endpoint is in use, does not belong to this machine, or cannot be listened at.
     """
     config = _read_config(path)
     if json.loads(config.get_json("mode")) != "router":
         message = f"'{path}' does not configure a router; it must say: mode: \"router\"."
         raise InvalidValueError(message)
+    _check_own_key(config)
     return _listen(config, f"the endpoints in '{path}'", "mend the file")
 
 
@@ -142,6 +144,20 @@ def is_connected(session: Session) -> bool:
 
 def _keys(credentials: "Credentials") -> dict[str, Any]:
     return tls_settings(credentials.authority, credentials.certificate, credentials.key)
+
+
+def _check_own_key(config: zenoh.Config) -> None:
+    """Check the key that a router shows, if its configuration names the files of one.
+
+    Raises:
+        HozError: See `open_configured_router`.
+    """
+    names = ("listen_certificate", "listen_private_key")
+    certificate, key = (json.loads(config.get_json(f"transport/link/tls/{name}")) for name in names)
+    if certificate and key:
+        from hoz_dist.wire.transport.credentials import check_key  # noqa: PLC0415 - slow to import
+
+        check_key(Path(certificate), Path(key))
 
 
 def _check_protection(endpoint: str, credentials: "Credentials | None") -> None:
