@@ -4,9 +4,10 @@ A private key is readable by its owner alone from the first moment on, and its f
 """
 
 import os
+import re
 import shutil
-import uuid
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import timedelta
 from functools import partial
@@ -20,11 +21,24 @@ from hoz_dist.errors import InvalidValueError, NotFoundError
 from hoz_dist.security.authority import Authority, KeyPair
 from hoz_dist.security.register import REGISTER_FILE, Identity, Register, check_identity
 from hoz_dist.security.router_file import router_file
-from hoz_dist.wire.transport.credentials import AUTHORITY_FILE, CERTIFICATE_FILE, KEY_FILE, ROUTER_FILE, common_name
+from hoz_dist.wire.transport.credentials import (
+    AUTHORITY_FILE,
+    CERTIFICATE_FILE,
+    KEY_FILE,
+    ROLES,
+    ROUTER_FILE,
+    common_name,
+)
 from hoz_dist.wire.transport.endpoint import DEFAULT_ENCRYPTED_ENDPOINT
 
 AUTHORITY_KEY_FILE: Final = "ca.key"
 _LOCK_FILE: Final = ".lock"
+_OLD_SUFFIX: Final = ".old"
+"""Of a key folder that another one takes the place of."""
+_LEFT_OVER: Final = re.compile(
+    rf"\.(?:(?P<of>(?:{'|'.join(ROLES)})-.+)|[0-9a-f]{{32}})(?P<suffix>{re.escape(_OLD_SUFFIX)}|{re.escape(TEMPORARY_SUFFIX)})"
+)
+"""Names of what a command that was killed may leave: of a key folder, or of a file. Nothing else is touched."""
 _LOCAL_HOSTS: Final = ("localhost", "127.0.0.1")
 """In the certificate of every router."""
 
@@ -67,7 +81,7 @@ def create_authority(folder: Path) -> None:
         InvalidValueError: One is there already.
     """
     folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-    with FileLock(folder / _LOCK_FILE):
+    with _locked(folder):
         if any((folder / name).exists() for name in (AUTHORITY_FILE, AUTHORITY_KEY_FILE)):
             message = (
                 f"'{folder}' has an authority already, and without it the keys that it issued are worth nothing; "
@@ -109,7 +123,7 @@ def issue_keys(
     """
     for name in names:
         check_identity(role, name)
-    with FileLock(_authority_folder(folder) / _LOCK_FILE):
+    with _locked(_authority_folder(folder)):
         authority, register = _load_authority(folder), Register(folder)
         targets = {name: folder / common_name(role, name) for name in names}
         for name, target in targets.items():
@@ -140,7 +154,7 @@ def withdraw_key(folder: Path, role: str, name: str) -> None:
         InvalidValueError: The name cannot be one.
     """
     check_identity(role, name)
-    with FileLock(_authority_folder(folder) / _LOCK_FILE):
+    with _locked(_authority_folder(folder)):
         register = Register(folder)
         struck_off = register.remove(role, name)
         shutil.rmtree(folder / common_name(role, name), ignore_errors=True)
@@ -189,20 +203,54 @@ def _issue(
 
 
 def _replace_folder(target: Path, authority: Authority, pair: KeyPair) -> None:
-    """Write a key folder beside its place, then put it there."""
-    temporary = target.with_name(f".{uuid.uuid4().hex}{TEMPORARY_SUFFIX}")
-    old = temporary.with_suffix(".old")
-    temporary.mkdir(mode=0o700)
+    """Write a key folder beside its place, then put it there; if that fails, the old one is there again."""
+    temporary, old = _beside(target, TEMPORARY_SUFFIX), _beside(target, _OLD_SUFFIX)
     try:
+        temporary.mkdir(mode=0o700)
         _write_private(temporary / KEY_FILE, pair.private_key_pem)
         (temporary / CERTIFICATE_FILE).write_bytes(pair.certificate_pem)
         (temporary / AUTHORITY_FILE).write_bytes(authority.pair.certificate_pem)
         if target.exists():
             target.rename(old)
         temporary.rename(target)
+    except BaseException:
+        _put_back(target, old)
+        raise
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
-        shutil.rmtree(old, ignore_errors=True)
+    shutil.rmtree(old, ignore_errors=True)
+
+
+def _beside(target: Path, suffix: str) -> Path:
+    return target.with_name(f".{target.name}{suffix}")
+
+
+def _put_back(target: Path, old: Path) -> None:
+    """Give a folder that was moved aside its name again, unless a new one has it."""
+    if old.is_dir() and not target.exists():
+        old.rename(target)
+
+
+@contextmanager
+def _locked(folder: Path) -> Iterator[None]:
+    """Have the folder of an authority to oneself, without what a command that was killed has left there."""
+    with FileLock(folder / _LOCK_FILE):
+        _sweep(folder)
+        yield
+
+
+def _sweep(folder: Path) -> None:
+    """Put key folders back that were moved aside for ones that never came, and delete the other left-overs."""
+    for left_over in folder.glob(".*"):
+        found = _LEFT_OVER.fullmatch(left_over.name)
+        if found is None:
+            continue
+        if found["of"] and found["suffix"] == _OLD_SUFFIX:
+            _put_back(folder / found["of"], left_over)
+        if left_over.is_dir():
+            shutil.rmtree(left_over, ignore_errors=True)
+        else:
+            left_over.unlink(missing_ok=True)
 
 
 def _write(path: Path, content: bytes) -> None:

@@ -1,6 +1,7 @@
 import json
 import os
 import re
+import shutil
 import stat
 from collections.abc import Iterator
 from datetime import timedelta
@@ -123,6 +124,51 @@ def test_a_key_is_replaced_when_that_is_wanted(folder: Path) -> None:
     assert new.serial != old.serial
     assert Register(folder).identities == (new,)
     assert sorted(one.name for one in folder.iterdir()) == [".lock", "actor-a0", "ca.key", "ca.pem", "issued.json"]
+
+
+@pytest.mark.parametrize("failing", [1, 2])
+@pytest.mark.parametrize("error", [KeyboardInterrupt, OSError])
+def test_the_old_key_stays_when_a_new_one_cannot_take_its_place(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, failing: int, error: type[BaseException]
+) -> None:
+    [(_, path)] = issue_keys(folder, "actor", ["a0"], DAY)
+    key, real, renamed = (path / "key.pem").read_bytes(), Path.rename, []
+
+    def fails_once(source: Path, target: Path) -> Path:
+        renamed.append(target)
+        if len(renamed) == failing:
+            raise error
+        return real(source, target)
+
+    monkeypatch.setattr(Path, "rename", fails_once)
+    with pytest.raises(error):
+        issue_keys(folder, "actor", ["a0"], DAY, replace=True)
+    assert (path / "key.pem").read_bytes() == key
+    assert sorted(one.name for one in folder.glob(".*")) == [".lock"]
+
+
+def test_what_a_killed_command_left_is_swept_by_the_next(folder: Path) -> None:
+    issue_keys(folder, "actor", ["a0", "a1", "a2"], DAY)
+    key = (folder / "actor-a0" / "key.pem").read_bytes()
+    (folder / "actor-a0").rename(folder / ".actor-a0.old")  # killed between the two renames
+    (folder / "actor-a1").rename(folder / ".actor-a1.tmp")  # before the first
+    shutil.copytree(folder / "actor-a2", folder / ".actor-a2.old")  # after the second
+    shutil.copytree(folder / "actor-a2", folder / f".{'0123456789abcdef' * 2}.old")  # of an earlier release
+    (folder / f".{'0123456789abcdef' * 2}.tmp").write_text("half a register")
+    (folder / ".somebodys.old").mkdir()
+    issue_keys(folder, "viewer", ["v0"], DAY)
+    assert (folder / "actor-a0" / "key.pem").read_bytes() == key
+    assert sorted(one.name for one in folder.iterdir()) == [
+        ".lock", ".somebodys.old", "actor-a0", "actor-a2", "ca.key", "ca.pem", "issued.json", "viewer-v0",
+    ]  # fmt: skip
+
+
+def test_a_withdrawn_key_does_not_come_back(folder: Path) -> None:
+    issue_keys(folder, "actor", ["a0"], DAY)
+    (folder / "actor-a0").rename(folder / ".actor-a0.old")
+    withdraw_key(folder, "actor", "a0")
+    issue_keys(folder, "viewer", ["v0"], DAY)
+    assert list(folder.rglob("key.pem")) == [folder / "viewer-v0" / "key.pem"]
 
 
 def test_every_router_knows_who_has_a_key(folder: Path) -> None:
