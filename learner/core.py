@@ -205,7 +205,8 @@ class LearnerCore:
         Its entries are finite: a message with others cannot be made.
         """
         lag, size = self.version - push.version, self._optimizer.size
-        norm, bound = gradient_norm(push.gradient), self.config.gradient_norm
+        bound = self.config.gradient_norm
+        norm = gradient_norm(push.gradient) if push.gradient.size == size else 0.0  # refused by its size
         most_frames = self.config.batch * self.config.rollout_steps
         schedule = self._schedule
         stranger = schedule is not None and push.actor not in schedule.actors

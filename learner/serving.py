@@ -124,7 +124,15 @@ class Learner:
             graphs: list[RoomGraph | SceneGraph] = [*core.graphs.rooms.values(), *core.graphs.scenes.values()]
             # The last thing that opens: what it answers with is all there.
             self._server = stack.enter_context(
-                Server(session, keys, snapshots, rejections=self._rejections, graphs=graphs, inbox=self._inbox)
+                Server(
+                    session,
+                    keys,
+                    snapshots,
+                    rejections=self._rejections,
+                    graphs=graphs,
+                    inbox=self._inbox,
+                    parameters=core.parameters.size,
+                )
             )
             self._open = stack.pop_all()
 

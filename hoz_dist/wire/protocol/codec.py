@@ -27,7 +27,7 @@ from hoz_dist.wire.protocol.messages import (
     SceneGraphReply,
     StatusReply,
 )
-from hoz_dist.wire.protocol.rejection import OtherVersionError, Reason, RejectedError
+from hoz_dist.wire.protocol.rejection import OtherVersionError, Reason, RejectedError, shown
 from hoz_dist.wire.protocol.schema import MOST_CHARACTERS, MOST_ELEMENTS
 
 PROTOCOL_VERSION: Final = 1
@@ -92,7 +92,7 @@ def decode(data: bytes, *expected: type[M]) -> M:
         if kind == message.KIND:
             return message.unpack(fields, kind)  # type: ignore[return-value]  # unpack of a subclass makes that subclass
     wanted = " or ".join(message.KIND for message in expected)
-    raise RejectedError(Reason.KIND, f"the message is a {kind!r:.40}, not a {wanted}")
+    raise RejectedError(Reason.KIND, f"the message is a {shown(kind)}, not a {wanted}")
 
 
 def checksum(data: bytes) -> bytes:

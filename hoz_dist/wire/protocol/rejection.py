@@ -66,6 +66,19 @@ def plain(text: str) -> str:
     return CONTROL.sub("?", text[:LONGEST_DETAIL])
 
 
+def shown(value: object) -> str:
+    """Return how a refusal quotes what somebody sent: never more than the beginning, however long the value is."""
+    match value:
+        case str():
+            return repr(value[:40])
+        case None | bool() | float():
+            return repr(value)
+        case int() if value.bit_length() <= 64:  # noqa: PLR2004 - as much as msgpack can hold
+            return repr(value)
+        case _:
+            return f"<{type(value).__name__}>"
+
+
 class RejectedError(HozError):
     """A message that is not accepted.
 
@@ -89,9 +102,10 @@ class OtherVersionError(RejectedError):
     """
 
     def __init__(self, theirs: object, ours: int) -> None:
-        super().__init__(Reason.VERSION, f"the message is of protocol version {theirs!r:.20}; this side speaks {ours}")
+        told = shown(theirs)
+        super().__init__(Reason.VERSION, f"the message is of protocol version {told}; this side speaks {ours}")
         sentence = (
-            f"The other side speaks protocol version {theirs!r:.20}; this side speaks {ours}: "
+            f"The other side speaks protocol version {told}; this side speaks {ours}: "
             "run the same release of hoz-dist on both."
         )
         self.args = (sentence,)

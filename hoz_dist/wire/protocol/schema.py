@@ -15,7 +15,7 @@ from typing import Annotated, Any, ClassVar, Final, Protocol, get_args, get_orig
 import numpy as np
 from numpy.typing import NDArray
 
-from hoz_dist.wire.protocol.rejection import CONTROL, Reason, RejectedError
+from hoz_dist.wire.protocol.rejection import CONTROL, Reason, RejectedError, shown
 
 MAX_INT: Final = 2**63 - 1
 MOST_ELEMENTS: Final = 4096
@@ -169,7 +169,7 @@ class Tensor:
         fields = _map_of(raw, self.FIELDS, where)
         shape, data = fields["shape"], fields["data"]
         if fields["dtype"] != self.dtype:
-            raise RejectedError(Reason.DTYPE, f"{where} is {fields['dtype']!r:.40}, not {self.dtype}")
+            raise RejectedError(Reason.DTYPE, f"{where} is {shown(fields['dtype'])}, not {self.dtype}")
         if type(shape) is not list or len(shape) != self.rank:
             raise RejectedError(Reason.SHAPE, f"{where} has no shape of {self.rank} axes")
         if not all(type(side) is int and 0 < side <= self.most for side in shape):
@@ -338,7 +338,7 @@ def _map_of(raw: object, names: AbstractSet[str], where: str) -> dict[str, Any]:
     missing, unknown = names - raw.keys(), raw.keys() - names
     if missing or unknown:
         told = [f"missing {', '.join(sorted(missing))}"] if missing else []
-        told += [f"unknown {', '.join(sorted(map(str, unknown)))[:200]}"] if unknown else []
+        told += [f"unknown {', '.join(sorted(map(shown, unknown)))[:200]}"] if unknown else []
         raise RejectedError(Reason.FIELDS, f"{where} has {' and '.join(told)}")
     return raw
 

@@ -13,15 +13,15 @@ from numpy.typing import NDArray
 from zenoh import KeyExpr, Query, Session
 
 from hoz_dist.closing import Closing
-from hoz_dist.wire.protocol.keys import NAME_PATTERN, NOBODY, Keys
-from hoz_dist.wire.protocol.message import SHARD_ELEMENTS
-from hoz_dist.wire.protocol.messages import Busy, ParametersHead, ParametersShard, Refused
+from hoz_dist.wire.protocol.keys import NAME_PATTERN, Keys
+from hoz_dist.wire.protocol.message import SHARD_ELEMENTS, Message
+from hoz_dist.wire.protocol.messages import Busy, ParametersHead, ParametersShard
 from hoz_dist.wire.protocol.parameters import Parameters, head_of
-from hoz_dist.wire.protocol.rejection import Reason, RejectedError
+from hoz_dist.wire.protocol.rejection import Reason, RejectedError, shown
 from hoz_dist.wire.protocol.rejections import Rejections
 from hoz_dist.wire.serving.versions import Versions
 from hoz_dist.wire.transport.publishing import NewestPublisher
-from hoz_dist.wire.transport.queryable import answer, declare_queryable, parameters_of
+from hoz_dist.wire.transport.queryable import answer, check_question, declare_queryable, parameters_of, refuse
 from hoz_dist.wire.transport.shared_memory import SharedMemory
 
 _LONGEST_NUMBER: Final = 18
@@ -79,21 +79,20 @@ class ParametersPublisher(Closing):
         newest = self._versions.newest
         if newest is None:
             query.drop()  # type: ignore[no-untyped-call]
-        elif query.key_expr.intersects(KeyExpr(self._keys.params)):
-            answer(query, self._keys.params, newest.head)
-        else:
-            self._answer_shard(query, newest.head)
-
-    def _answer_shard(self, query: Query, newest: ParametersHead) -> None:
-        key = str(query.key_expr)
+            return
+        epoch = newest.head.epoch
         try:
-            reply = self._shard(key.removeprefix(self._keys.params + "/"), parameters_of(query))
+            check_question(query)
+            if query.key_expr.intersects(KeyExpr(self._keys.params)):
+                key, memory = self._keys.params, None
+                reply: Message = newest.head
+            else:
+                key, memory = str(query.key_expr), self._memory
+                reply = self._shard(key.removeprefix(self._keys.params + "/"), parameters_of(query)) or Busy(epoch)
         except RejectedError as error:
-            if error.reason != Reason.GONE:
-                self._rejections.count(error.reason, error.detail, NOBODY)
-            answer(query, key, Refused.of(error, newest.epoch))
+            refuse(query, error, epoch, self._rejections)
         else:
-            answer(query, key, reply or Busy(newest.epoch), self._memory)
+            answer(query, key, reply, memory)
 
     def _shard(self, name: str, asked: dict[str, str]) -> ParametersShard | None:
         """Return the shard that is asked for; None when one more version cannot be kept now.
@@ -107,7 +106,7 @@ class ParametersPublisher(Closing):
         """
         number, reader, now = _number("the shard", name), asked.get("reader", ""), time.monotonic()
         if not NAME_PATTERN.fullmatch(reader):
-            raise RejectedError(Reason.NAME, f"the reader's name is not well formed: {reader!r:.80}")
+            raise RejectedError(Reason.NAME, f"the reader's name is not well formed: {shown(reader)}")
         if "version" in asked:
             stamp = (_number("the epoch", asked.get("epoch", "")), _number("the version", asked["version"]))
             parameters = self._versions.go_on(reader, stamp, number, now)
@@ -136,5 +135,5 @@ def _number(what: str, text: str) -> int:
         RejectedError: It is none.
     """
     if not (text.isascii() and text.isdigit() and len(text) <= _LONGEST_NUMBER):
-        raise RejectedError(Reason.MALFORMED, f"{what} is no number: {text!r:.80}")
+        raise RejectedError(Reason.MALFORMED, f"{what} is no number: {shown(text)}")
     return int(text)

@@ -16,7 +16,7 @@ from hoz_dist.graph.room_graph import RoomGraph
 from hoz_dist.graph.scene_graph import SceneGraph
 from hoz_dist.wire.protocol.codec import checksum, decode, encode
 from hoz_dist.wire.protocol.graphs import room_graph_reply, scene_graph_reply
-from hoz_dist.wire.protocol.keys import NOBODY, Keys, sender_of
+from hoz_dist.wire.protocol.keys import Keys, sender_of
 from hoz_dist.wire.protocol.message import Message
 from hoz_dist.wire.protocol.messages import EpisodesPush, GradientPush, Push, Refused, RoomGraphPush
 from hoz_dist.wire.protocol.rejection import Reason, RejectedError
@@ -24,13 +24,13 @@ from hoz_dist.wire.protocol.rejections import Rejections
 from hoz_dist.wire.serving.inbox import Inbox, Reaper, Request
 from hoz_dist.wire.serving.snapshots import GraphReply, Snapshots
 from hoz_dist.wire.transport.publishing import NewestPublisher
-from hoz_dist.wire.transport.queryable import answer, declare_queryable, parameters_of, refusal_of
+from hoz_dist.wire.transport.queryable import answer, check_question, declare_queryable, parameters_of, refuse
 
 _CHECKSUM_BYTES: Final = 8
-_LONGEST_QUESTION: Final = 4096
-"""Characters of a question's key and parameters; the longest that makes sense names all categories."""
-_NOT_COUNTED: Final = frozenset({Reason.NOT_FOUND})
-"""Reasons for which nobody is to blame."""
+MOST_BYTES_OF_GRAPHS: Final = 512 * 1024
+"""What one question is answered with; more would stand in the queue of a slow link in front of all else."""
+_BESIDE_GRADIENT: Final = 4096
+"""Room for all but the numbers in the encoded form of a gradient, bytes."""
 
 
 class Server(Closing):
@@ -43,6 +43,8 @@ class Server(Closing):
         rejections: Where to count rejections.
         graphs: Graphs to serve from the first question on.
         inbox: Where pushes are to wait.
+        parameters: Number of parameters of the policy, P: a gradient that is longer is not even copied; None if any
+            length will do.
 
     Attributes:
         session: The session.
@@ -60,6 +62,7 @@ class Server(Closing):
         rejections: Rejections | None = None,
         graphs: Iterable[SceneGraph | RoomGraph] = (),
         inbox: Inbox | None = None,
+        parameters: int | None = None,
     ) -> None:
         self.inbox = inbox if inbox is not None else Inbox()  # an empty one is false
         self.rejections = rejections or Rejections()
@@ -67,6 +70,9 @@ class Server(Closing):
         self.session = session
         self._keys = keys
         self._epoch = snapshots.config.epoch
+        self._most_bytes_of: dict[type[Push], int] = {}
+        if parameters is not None:
+            self._most_bytes_of[GradientPush] = min(4 * parameters + _BESIDE_GRADIENT, GradientPush.MOST_BYTES)
         self._publishers: dict[str, NewestPublisher] = {}
         for graph in graphs:
             self.put_graph(graph)
@@ -74,10 +80,10 @@ class Server(Closing):
             keys.all_grads: lambda query: self._receive(query, GradientPush),
             keys.all_rollouts: lambda query: self._receive(query, EpisodesPush),
             keys.all_rooms: lambda query: self._receive(query, RoomGraphPush),
-            keys.config: lambda query: answer(query, keys.config, snapshots.config),
-            keys.status: lambda query: answer(query, keys.status, snapshots.status()),
-            keys.all_graphs: self._answer_graph,
-            keys.all_plans: self._answer_plan,
+            keys.config: self._limited(lambda query: answer(query, keys.config, snapshots.config)),
+            keys.status: self._limited(lambda query: answer(query, keys.status, snapshots.status())),
+            keys.all_graphs: self._limited(self._answer_graph),
+            keys.all_plans: self._limited(self._answer_plan),
         }
         self._queryables = [
             declare_queryable(session, key, handle, self._epoch, self.rejections) for key, handle in handlers.items()
@@ -123,8 +129,9 @@ class Server(Closing):
         """
         payload, attachment = query.payload, query.attachment
         size = len(payload) if payload is not None else 0
-        if size > expected.MOST_BYTES:  # not even copied
-            raise RejectedError(Reason.SIZE, f"the message has {size} bytes, more than {expected.MOST_BYTES}")
+        most = self._most_bytes_of.get(expected, expected.MOST_BYTES)
+        if size > most:  # not even copied
+            raise RejectedError(Reason.SIZE, f"the message has {size} bytes, more than {most}")
         data = payload.to_bytes() if payload is not None else b""
         if attachment is None or len(attachment) != _CHECKSUM_BYTES or attachment.to_bytes() != checksum(data):
             raise RejectedError(Reason.CHECKSUM, f"the {size} bytes do not have the checksum sent along")
@@ -145,6 +152,19 @@ class Server(Closing):
             case _:  # pragma: no cover - every kind that is received stands above
                 raise TypeError(message)
 
+    def _limited(self, handle: Callable[[Query], None]) -> Callable[[Query], None]:
+        """Return what refuses questions that are too long, and handles the others."""
+
+        def refuse_or_handle(query: Query) -> None:
+            try:
+                check_question(query)
+            except RejectedError as error:
+                refuse(query, error, self._epoch, self.rejections)
+            else:
+                handle(query)
+
+        return refuse_or_handle
+
     def _answer_graph(self, query: Query) -> None:
         """Answer with the graph of that name, or with all graphs that a wildcard selects."""
         prefix = self._keys.graph("")
@@ -152,10 +172,32 @@ class Server(Closing):
         if "*" not in name:
             self._answer_or_refuse(query, lambda: self.snapshots.graph(name))
             return
+        try:
+            selected = self._selected(query.key_expr, prefix)
+        except RejectedError as error:
+            refuse(query, error, self._epoch, self.rejections)
+            return
         with query:
-            for name, graph in self.snapshots.graphs.items():
-                if query.key_expr.intersects(KeyExpr(prefix + name)):
-                    query.reply(prefix + name, encode(graph))
+            for key, payload in selected.items():
+                query.reply(key, payload)
+
+    def _selected(self, key_expr: KeyExpr, prefix: str) -> dict[str, bytes]:
+        """Return the encoded graphs that a wildcard selects, by key.
+
+        Raises:
+            RejectedError: They are too much for one question.
+        """
+        selected, size = {}, 0
+        for name, graph in self.snapshots.graphs.items():
+            if key_expr.intersects(KeyExpr(prefix + name)):
+                selected[prefix + name] = payload = encode(graph)
+                size += len(payload)
+            if size > MOST_BYTES_OF_GRAPHS:
+                limit = f"{MOST_BYTES_OF_GRAPHS >> 10} KiB"
+                raise RejectedError(
+                    Reason.SIZE, f"these graphs have more than {limit}: ask scene by scene, or room by room"
+                )
+        return selected
 
     def _answer_plan(self, query: Query) -> None:
         """Answer with a plan for the target and the seen categories that the parameters name."""
@@ -165,12 +207,8 @@ class Server(Closing):
     def _answer_or_refuse(self, query: Query, make: Callable[[], Message]) -> None:
         """Answer a question, or say in one sentence what is wrong with it."""
         try:
-            if len(str(query.selector)) > _LONGEST_QUESTION:
-                refusal = f"the question is longer than {_LONGEST_QUESTION} characters"
-                raise RejectedError(Reason.SIZE, refusal)
             message = make()
         except HozError as error:
-            message = refusal_of(error, self._epoch)
-            if message.reason not in _NOT_COUNTED:
-                self.rejections.count(Reason(message.reason), message.detail, NOBODY)
-        answer(query, str(query.key_expr), message)
+            refuse(query, error, self._epoch, self.rejections)
+        else:
+            answer(query, str(query.key_expr), message)

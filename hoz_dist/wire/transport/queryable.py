@@ -18,6 +18,10 @@ from hoz_dist.wire.protocol.rejections import Rejections
 from hoz_dist.wire.transport.draining import Drain
 from hoz_dist.wire.transport.shared_memory import SharedMemory
 
+LONGEST_QUESTION: Final = 4096
+"""Characters of a question's key and parameters; the longest that makes sense names all categories."""
+_NOT_COUNTED: Final = frozenset({Reason.NOT_FOUND, Reason.GONE})
+"""Reasons for which nobody is to blame."""
 _CHANNEL: Final = 16
 """Queries that Zenoh holds while the thread is busy with the one before; more of them block the sender's transport."""
 
@@ -37,6 +41,24 @@ def answer(query: Query, key: str, message: Message, memory: SharedMemory | None
             query.reply_err(payload)
         else:
             query.reply(key, payload if memory is None else memory.wrap(payload))
+
+
+def check_question(query: Query) -> None:
+    """Judge the length of a question.
+
+    Raises:
+        RejectedError: It is too long to be looked at.
+    """
+    if len(str(query.selector)) > LONGEST_QUESTION:
+        raise RejectedError(Reason.SIZE, f"the question is longer than {LONGEST_QUESTION} characters")
+
+
+def refuse(query: Query, error: HozError, epoch: int, rejections: Rejections) -> None:
+    """Say in one sentence what is wrong with a question, and count it if somebody is to blame."""
+    refusal = refusal_of(error, epoch)
+    if refusal.reason not in _NOT_COUNTED:
+        rejections.count(Reason(refusal.reason), refusal.detail, NOBODY)
+    answer(query, "", refusal)
 
 
 def parameters_of(query: Query) -> dict[str, str]:

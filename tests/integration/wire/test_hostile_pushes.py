@@ -12,8 +12,9 @@ from hoz_dist.wire.protocol.messages import (
     Refused,
 )
 from hoz_dist.wire.serving.server import Server
+from hoz_dist.wire.serving.snapshots import Snapshots
 from hoz_dist.wire.transport.ask import ask
-from hoz_dist.wire.transport.session import Session, open_client
+from hoz_dist.wire.transport.session import Session, open_client, open_router
 from tests import wire_samples as samples
 from tests.integration.wire.pushing import GRADS, KEYS, WAIT_S, answering, encoded_gradient, push_to, raw_push
 
@@ -47,6 +48,21 @@ def test_a_bad_push_of_a_room_is_counted_for_its_actor(learner: Server, client: 
     key = KEYS.room("a0", samples.ROOM)
     raw_push(client, key, b"")
     assert learner.rejections.by_sender() == {"a0": 1}
+
+
+def test_a_gradient_longer_than_the_policy_is_refused_by_its_size(endpoint: str) -> None:
+    snapshots = Snapshots(samples.config_reply(), samples.status_reply, "product")
+    with (
+        open_router(endpoint) as session,
+        Server(session, KEYS, snapshots, parameters=100) as server,
+        open_client(endpoint) as client,
+    ):
+        (answer,) = raw_push(client, GRADS, encoded_gradient(0, size=2000))
+        refused = decode(answer, Refused)
+        assert (refused.reason, refused.detail) == ("size", "the message has 8116 bytes, more than 4496")
+        with answering(server.inbox, lambda _: Accepted(1, 1)) as came:
+            push_to(client, samples.gradient_push(size=100))
+        assert len(came) == 1
 
 
 def test_a_push_damaged_on_the_way_is_sent_again(learner: Server, client: Session, endpoint: str) -> None:

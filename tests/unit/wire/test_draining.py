@@ -16,7 +16,7 @@ class Channel:
 
     @property
     def handler(self) -> Iterator[int]:
-        return iter(self.queue.get, None)  # type: ignore[arg-type]  # the type of iter keeps the end
+        return iter(self.queue.get, None)
 
     def undeclare(self) -> None:
         self.queue.put(None)
@@ -26,7 +26,7 @@ def test_a_flood_of_failures_is_logged_now_and_then(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     clock = [100.0]
-    monkeypatch.setattr(draining.time, "monotonic", lambda: clock[0])
+    monkeypatch.setattr("hoz_dist.wire.transport.draining.time.monotonic", lambda: clock[0])
     handled = []
 
     def fail(received: int) -> None:

@@ -2,7 +2,7 @@ import logging
 
 import pytest
 
-from hoz_dist.wire.protocol.rejection import Reason
+from hoz_dist.wire.protocol.rejection import Reason, shown
 from hoz_dist.wire.protocol.rejections import MOST_SENDERS, OTHER_SENDERS, Rejections
 
 
@@ -33,3 +33,13 @@ def test_invented_senders_do_not_fill_the_memory() -> None:
         rejections.count(Reason.NAME, "?", f"s{number}")
     assert len(rejections.by_sender()) == MOST_SENDERS + 1
     assert rejections.by_sender()[OTHER_SENDERS] == 50
+
+
+@pytest.mark.parametrize("value", ["x" * 10**6, b"x" * 10**6, [0] * 10**6, {"a": "x" * 10**6}, 10**1000], ids=type)
+def test_what_is_quoted_is_short(value: object) -> None:
+    assert len(shown(value)) < 50
+
+
+@pytest.mark.parametrize("value", ["gradient", 2**64 - 1, 1.5, True, None])
+def test_what_is_short_is_quoted_as_it_is(value: object) -> None:
+    assert shown(value) == repr(value)
