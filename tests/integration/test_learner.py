@@ -1,6 +1,8 @@
 """The learner's service over real Zenoh, killed and restarted as a real process."""
 
+import errno
 import json
+import os
 import resource
 import signal
 import subprocess
@@ -13,6 +15,7 @@ import numpy as np
 import pytest
 
 from hoz_dist.client import HozClient
+from hoz_dist.errors import HozError
 from hoz_dist.graph.planner import plan_for
 from hoz_dist.graph.scene_graph import merge_rooms
 from hoz_dist.policy.parameters import initial_parameters
@@ -22,6 +25,7 @@ from hoz_dist.wire.protocol.rejection import Reason
 from learner.checkpoint import load_checkpoint
 from learner.core import LearnerCore
 from learner.events import GradientReceived
+from learner.recorder import UpdateLog
 from learner.replay import read_updates
 from tests.integration.learning import (
     CONFIG,
@@ -237,6 +241,23 @@ def test_a_full_disk_does_not_stop_the_training_and_is_said_at_the_end(free_port
         assert "Cannot save the last checkpoint" in learner.process.stderr.read()
     assert load_checkpoint(run).version == 2
     assert len(read_updates(run)) == 2
+
+
+@pytest.mark.parametrize("step", ["flush", "sync"])
+def test_no_checkpoint_is_saved_without_the_record_of_its_updates(
+    free_port: int, tmp_path: Path, step: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(_: UpdateLog) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(UpdateLog, step, fail)
+    with (
+        pytest.raises(HozError, match="Cannot save the last checkpoint"),
+        running_learner(free_port, tmp_path / "run") as endpoint,
+        FakeActor(endpoint, "run") as actor,
+    ):
+        assert isinstance(actor.gradient(0, (1, 0), gradient_for(actor.fetch(), 0)), Accepted)
+    assert not list((tmp_path / "run" / "checkpoints").glob("*"))
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
