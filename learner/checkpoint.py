@@ -8,10 +8,13 @@ The name says where in the run it belongs: ``0002-000000123`` is version 123 of 
 comes after all of an earlier one, also when its version is lower: what came in between was lost with its learner.
 """
 
+import errno
 import json
 import logging
+import os
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, NamedTuple, Protocol
@@ -19,12 +22,12 @@ from typing import Any, Final, NamedTuple, Protocol
 import numpy as np
 import xxhash
 from numpy.typing import NDArray
-from safetensors import SafetensorError, safe_open
-from safetensors.numpy import save_file
+from safetensors import SafetensorError
+from safetensors.numpy import load, save_file
 
 from hoz_dist.atomic import replace_file
 from hoz_dist.config import RunConfig
-from hoz_dist.errors import DamagedFileError, InvalidValueError, NotFoundError
+from hoz_dist.errors import DamagedFileError, HozError, InvalidValueError, NotFoundError
 from hoz_dist.graph.room_graph import RoomGraph
 from hoz_dist.graph.scene_graph import SceneGraph, merge_rooms
 from learner.optimizer import AdamState, Vector
@@ -40,6 +43,34 @@ NEWEST_KEPT: Final = 3
 _STEM: Final = re.compile(r"([0-9]{4,})-([0-9]{9,})")
 
 _log = logging.getLogger(__name__)
+
+
+class UnreadableError(HozError):
+    """The system cannot read a file now, which says nothing of what is in it.
+
+    Args:
+        path: What was read.
+        error: What the system says.
+    """
+
+    def __init__(self, path: Path, error: OSError) -> None:
+        super().__init__(
+            f"Cannot read '{error.filename or path}' ({error.strerror or error}); "
+            "mend the disk or the rights, and start again."
+        )
+
+
+@contextmanager
+def reading(path: Path) -> Iterator[None]:
+    """Make an `UnreadableError` of an `OSError`.
+
+    Args:
+        path: What is read.
+    """
+    try:
+        yield
+    except OSError as error:
+        raise UnreadableError(path, error) from error
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -151,11 +182,13 @@ def load_checkpoint(path: Path) -> Checkpoint:
     Raises:
         NotFoundError: There is no such file, or no checkpoint in the folder.
         DamagedFileError: The file, or every checkpoint of the folder, is damaged or something else.
+        UnreadableError: The system cannot read it now; nobody knows whether it is damaged.
         InvalidValueError: The checkpoint is of another version of the format.
     """
-    if not path.is_dir():
-        return _load_file(path)
-    folder = path / FOLDER if (path / FOLDER).is_dir() else path
+    with reading(path):
+        if not path.is_dir():
+            return _load_file(path)
+        folder = path / FOLDER if (path / FOLDER).is_dir() else path
     checkpoint, damaged = newest_readable(folder)
     for failure in damaged.values():
         _log.warning("%s", failure)
@@ -177,30 +210,44 @@ def newest_readable(
     Raises:
         NotFoundError: There is no checkpoint in the folder.
         DamagedFileError: Every checkpoint is damaged or something else.
+        UnreadableError: The folder, or a checkpoint newer than all that can be read, cannot be read now.
         InvalidValueError: The newest that is not damaged is of another version of the format.
     """
-    files = checkpoint_files(folder)
+    with reading(folder):
+        files = checkpoint_files(folder)
     if not files:
         message = f"There is no checkpoint in '{folder}'; give a checkpoint file or the folder of a run that saved one."
         raise NotFoundError(message)
     damaged: dict[Path, DamagedFileError] = {}
     for file in files:
         try:
-            return (read or _load_file)(file), damaged
+            with reading(file):
+                return (read or _load_file)(file), damaged
         except DamagedFileError as error:
             damaged[file] = error
+        except NotFoundError as error:
+            # Deleted since the folder was read. To go on with an older one would throw away what came after it.
+            raise UnreadableError(file, FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT))) from error
     message = f"None of the {len(files)} checkpoints in '{folder}' can be read; the newest is '{files[0].name}'."
     raise DamagedFileError(message)
 
 
 def checkpoint_files(folder: Path) -> list[Path]:
-    """Return the checkpoints of a folder, the newest first."""
+    """Return the checkpoints of a folder, the newest first; none when there is no such folder.
+
+    Raises:
+        OSError: The folder cannot be read.
+    """
     return [file for _, file in _stamped(folder)]
 
 
 def _stamped(folder: Path) -> list[tuple[Stamp, Path]]:
     """Return the checkpoints of a folder and where in the run they belong, the newest first."""
-    stamped = ((Stamp.of(file), file) for file in folder.glob(f"*{SUFFIX}"))
+    try:
+        # Not by `glob`, for which a folder that it may not read is an empty one.
+        stamped = [(Stamp.of(file), file) for file in folder.iterdir()]
+    except FileNotFoundError:
+        return []
     return sorted(((stamp, file) for stamp, file in stamped if stamp is not None), reverse=True)
 
 
@@ -259,19 +306,23 @@ def _digest(text: str, tensors: Mapping[str, NDArray[Any]]) -> str:
 
 
 def _load_file(path: Path) -> Checkpoint:
-    if not path.is_file():
-        message = f"There is no checkpoint '{path}'; give a checkpoint file or the folder of a run."
-        raise NotFoundError(message)
     try:
-        with safe_open(path, framework="np") as file:
-            metadata = file.metadata() or {}
-            tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 - not a mapping
+        # As a whole, and not mapped into memory, where a disk that fails ends the process.
+        content = path.read_bytes()
+    except (FileNotFoundError, NotADirectoryError, IsADirectoryError) as error:
+        message = f"There is no checkpoint '{path}'; give a checkpoint file or the folder of a run."
+        raise NotFoundError(message) from error
+    except OSError as error:
+        raise UnreadableError(path, error) from error
+    try:
+        tensors = load(content)
+        metadata = json.loads(content[8 : 8 + int.from_bytes(content[:8], "little")]).get("__metadata__", {})
         text = metadata["hoz"]
         if metadata["digest"] != _digest(text, tensors):
             message = "the digest does not match"
             raise ValueError(message)  # noqa: TRY301 - one handler for all kinds of damage
         values = json.loads(text)
-    except (SafetensorError, OSError, ValueError, KeyError) as error:
+    except (SafetensorError, ValueError, KeyError) as error:
         message = f"'{path}' is damaged or not a checkpoint of hoz-dist ({error}); use another checkpoint of the run."
         raise DamagedFileError(message) from error
     if values["format"] != FORMAT:

@@ -22,14 +22,14 @@ from hoz_dist.wire.protocol.keys import Keys
 from hoz_dist.wire.transport.session import Session, is_connected, open_client, open_router
 from hoz_dist.wire.transport.settings import SERVICE_LEASE_MS
 from hoz_dist.wire.transport.shared_memory import SharedMemory
-from learner.checkpoint import Checkpoint
+from learner.checkpoint import Checkpoint, UnreadableError
 from learner.core import LearnerCore
 from learner.leadership import DeposedError, Leadership
 from learner.log_file import logged_to
 from learner.replay import Schedule, read_updates
 from learner.run_folder import RunFolder
 from learner.serving import Learner
-from learner.standby import ReadAhead, follow
+from learner.standby import RETRY_S, ReadAhead, follow
 
 if TYPE_CHECKING:
     from hoz_dist.wire.transport.credentials import Credentials
@@ -88,9 +88,10 @@ def serve(settings: LearnerSettings, stop: threading.Event) -> None:
         _opened(settings, memory, stop) as session,
     ):
         folder.make()
-        leadership = None if settings.standby else folder.claim_or_refuse()
+        ahead = ReadAhead(folder.checkpoints)
+        leadership = None if settings.standby else folder.claim_or_refuse(ahead.read)
         with leadership or nullcontext(), logged_to(folder.log, settings.name), Members(session, keys) as members:
-            _Turns(settings, folder, session, keys, members, cores, memory).take(leadership, stop)
+            _Turns(settings, folder, session, keys, members, cores, memory).take(leadership, ahead, stop)
 
 
 class _Cores:
@@ -142,22 +143,33 @@ class _Turns:
         self._memory = memory
         self._incarnation = secrets.randbits(48)
 
-    def take(self, leadership: Leadership | None, stop: threading.Event) -> None:
+    def take(self, leadership: Leadership | None, ahead: ReadAhead, stop: threading.Event) -> None:
         """Lead or follow until ``stop`` is set, or the run is over.
 
         Args:
             leadership: The right to begin with leading; None to begin with following.
+            ahead: What keeps the newest checkpoint read.
             stop: Ends both.
 
         Raises:
             DeposedError: Another learner leads, and this process, being its own router, cannot follow.
+            UnreadableError: A learner that is no standby cannot read the run.
         """
-        ahead = ReadAhead(self._folder.checkpoints)
         while True:
+            follows = leadership is None
             if leadership is None:
                 leadership = self._follow(ahead, stop)
-            if leadership is None or not self._lead(leadership, ahead, stop):
-                return
+            try:
+                if leadership is None or not self._lead(leadership, ahead, stop):
+                    return
+            except UnreadableError as error:
+                # It could be read when the epoch was claimed; before the next is, it must be again.
+                if not follows:
+                    raise
+                _log.warning("%s This standby goes on trying.", error)
+                leadership, ahead = None, ReadAhead(self._folder.checkpoints)
+                stop.wait(RETRY_S)
+                continue
             _log.warning("deposed: another learner leads run %s after epoch %d", self._keys.run, leadership.epoch)
             if self._settings.connect is None:
                 raise DeposedError(self._folder.path, leadership.epoch)

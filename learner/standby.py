@@ -14,7 +14,8 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 from hoz_dist.errors import HozError
-from learner.checkpoint import Checkpoint, checkpoint_files, load_checkpoint
+from hoz_dist.outage import Outage
+from learner.checkpoint import Checkpoint, UnreadableError, checkpoint_files, load_checkpoint
 from learner.leadership import Leadership
 from learner.run_folder import RunFolder
 
@@ -27,6 +28,8 @@ RECONNECTED_S: Final = 4.0
 STOOD_STILL_S: Final = 1.0
 """A standby that has not looked for so long stood still itself, and what it saw before is worth nothing."""
 LOOK_S: Final = 0.05
+RETRY_S: Final = 1.0
+"""Time until a run that cannot be read is looked at again."""
 READ_AHEAD_S: Final = 2.0
 """How often to look for a newer checkpoint to read ahead."""
 
@@ -91,8 +94,8 @@ class ReadAhead:
 
     def refresh(self) -> None:
         """Read the newest checkpoint, if it is another one than before; nothing that is wrong with it matters yet."""
-        files = checkpoint_files(self._folder)
         try:
+            files = checkpoint_files(self._folder)
             if files and _identity(files[0]) != self._identity:
                 self.read(files[0])
         except (HozError, OSError) as error:
@@ -109,7 +112,7 @@ class ReadAhead:
 def follow(
     folder: RunFolder, sight: Callable[[], tuple[bool, bool]], ahead: ReadAhead, stop: threading.Event
 ) -> Leadership | None:
-    """Wait until it is time to take over, and claim the run.
+    """Wait until it is time to take over, and claim the run; nothing is claimed that could not be taken over.
 
     Args:
         folder: The run folder.
@@ -121,19 +124,28 @@ def follow(
         The leadership; None when ``stop`` was set.
 
     Raises:
-        HozError: The run has another configuration, or its folder cannot be written.
+        HozError: The run has another configuration, every checkpoint is damaged, or its folder cannot be written.
     """
     rule, read_at = TakeOverRule(), time.monotonic()
+    outage = Outage(_log, "%s This standby goes on trying.", "the run can be read again")
     while not stop.is_set():
-        seen, now = _look(folder, *sight()), time.monotonic()
-        if rule.is_time(seen, now):
-            folder.check()
-            leadership = folder.claim(seen.epoch)
-            if leadership is not None:
-                return leadership
-        if seen.leader and now >= read_at:
-            ahead.refresh()
-            read_at = time.monotonic() + READ_AHEAD_S
+        try:
+            seen, now = _look(folder, *sight()), time.monotonic()
+            if rule.is_time(seen, now):
+                folder.check_going_on(ahead.read)
+                outage.worked()
+                leadership = folder.claim(seen.epoch)
+                if leadership is not None:
+                    return leadership
+        except UnreadableError as error:
+            outage.failed(error)
+            stop.wait(RETRY_S)
+            continue
+        if seen.leader:
+            outage.worked()
+            if now >= read_at:
+                ahead.refresh()
+                read_at = time.monotonic() + READ_AHEAD_S
         stop.wait(LOOK_S)
     return None
 

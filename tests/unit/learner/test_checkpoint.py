@@ -10,11 +10,19 @@ import pytest
 from safetensors.numpy import load_file, save_file
 
 from hoz_dist.errors import DamagedFileError, InvalidValueError, NotFoundError
-from learner.checkpoint import Checkpoint, Stamp, checkpoint_files, load_checkpoint, save_checkpoint
+from learner.checkpoint import (
+    Checkpoint,
+    Stamp,
+    UnreadableError,
+    checkpoint_files,
+    load_checkpoint,
+    newest_readable,
+    save_checkpoint,
+)
 from learner.core import LearnerCore
 from learner.events import EpisodesReceived, RoomGraphReceived
 from learner.leadership import DeposedError
-from tests.unit.learner.disk import full_disk
+from tests.unit.learner.disk import PASSING, full_disk, unreadable
 from tests.unit.learner.making import CONFIG, answer, episodes, gradient, leading, push, room_graph, room_push, vector
 
 
@@ -215,6 +223,35 @@ def test_damage_to_the_newest_falls_back_to_the_one_before_and_is_warned_of(
         damage(path)
     with pytest.raises(DamagedFileError, match="None of the 3 checkpoints"):
         load_checkpoint(tmp_path)
+
+
+@pytest.mark.parametrize("number", PASSING)
+def test_what_cannot_be_read_now_is_not_damaged_and_no_reason_to_fall_back(
+    tmp_path: Path, checkpoint: Checkpoint, number: int
+) -> None:
+    folder = tmp_path / "checkpoints"
+    paths = [save_checkpoint(folder, with_version(checkpoint, version)) for version in (1, 2, 3)]
+    damage(paths[2])
+    for path in (paths[1], folder):
+        with unreadable(path, number), pytest.raises(UnreadableError, match=rf"Cannot read '{path}' \(.+\); mend"):
+            load_checkpoint(tmp_path)
+    with unreadable(paths[1], number), pytest.raises(UnreadableError):
+        load_checkpoint(paths[1])
+    assert load_checkpoint(tmp_path).version == 2
+
+
+def test_a_checkpoint_that_is_deleted_while_the_newest_is_looked_for_is_no_reason_to_fall_back(
+    tmp_path: Path, checkpoint: Checkpoint
+) -> None:
+    for version in (1, 2):
+        save_checkpoint(tmp_path, with_version(checkpoint, version))
+
+    def read(path: Path) -> Checkpoint:
+        path.unlink()
+        return load_checkpoint(path)
+
+    with pytest.raises(UnreadableError, match="No such file"):
+        newest_readable(tmp_path, read)
 
 
 def test_after_a_fall_back_the_new_checkpoint_is_not_the_one_that_is_deleted(

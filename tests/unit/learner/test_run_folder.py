@@ -8,13 +8,13 @@ import pytest
 
 from hoz_dist.config import RunConfig
 from hoz_dist.errors import DamagedFileError, InvalidValueError, NotFoundError, RunMismatchError
-from learner.checkpoint import save_checkpoint
+from learner.checkpoint import UnreadableError, save_checkpoint
 from learner.core import LearnerCore
 from learner.leadership import DeposedError
 from learner.replay import read_updates
 from learner.run_folder import LedRun, RunFolder, read_config
-from tests.unit.learner.disk import full_disk
-from tests.unit.learner.making import CONFIG, gradient, push, vector
+from tests.unit.learner.disk import PASSING, full_disk, unreadable
+from tests.unit.learner.making import CONFIG, gradient, leading, push, vector
 
 
 def contents(folder: Path) -> dict[str, bytes]:
@@ -91,10 +91,35 @@ def test_a_damaged_newest_checkpoint_is_set_aside_and_nothing_is_lost(
 def test_when_every_checkpoint_is_damaged_none_is_touched(tmp_path: Path) -> None:
     with opened(tmp_path) as run:
         save_checkpoint(run.folder.checkpoints, LearnerCore(CONFIG, vector(0)).snapshot(0.0)).write_bytes(b"")
-    before = contents(tmp_path / "checkpoints")
+    before = contents(tmp_path)
     with pytest.raises(DamagedFileError, match="None of the 1 checkpoints"), opened(tmp_path):
         pass
-    assert contents(tmp_path / "checkpoints") == before
+    assert contents(tmp_path) == before  # and no epoch was used up either
+
+
+@pytest.mark.parametrize("number", PASSING)
+def test_a_checkpoint_that_cannot_be_read_now_changes_nothing_and_rolls_nothing_back(
+    tmp_path: Path, number: int
+) -> None:
+    with opened(tmp_path) as run:
+        core = LearnerCore(CONFIG, vector(0), epoch=run.leadership.epoch)
+        for version in range(2):
+            push(core, gradient(version, version=version))
+            newest = save_checkpoint(run.folder.checkpoints, core.snapshot(0.0), files=run.leadership)
+    before = contents(tmp_path)
+    for path in (newest, newest.parent, tmp_path):
+        with unreadable(path, number), pytest.raises(UnreadableError, match="Cannot read"), opened(tmp_path):
+            pass
+    assert contents(tmp_path) == before
+    checkpoints = contents(tmp_path / "checkpoints")
+    with leading(tmp_path) as leadership:
+        for path in (newest, newest.parent):
+            with unreadable(path, number), pytest.raises(UnreadableError, match="Cannot read"):
+                RunFolder(tmp_path, CONFIG).take_over(leadership)
+    assert contents(tmp_path / "checkpoints") == checkpoints
+    with opened(tmp_path) as run:
+        assert run.checkpoint is not None
+        assert (run.leadership.epoch, run.checkpoint.version) == (3, 2)
 
 
 def test_a_full_disk_is_said_in_one_sentence(tmp_path: Path) -> None:
@@ -121,7 +146,10 @@ def test_a_configuration_that_came_while_a_standby_waited_is_compared_too(tmp_pa
     folder.check()
     with opened(tmp_path):
         pass
-    with folder.claim_or_refuse() as leadership, pytest.raises(RunMismatchError, match="seed"):
+    with pytest.raises(RunMismatchError, match="seed"):
+        folder.claim_or_refuse()
+    assert folder.newest_epoch() == 1
+    with leading(tmp_path) as leadership, pytest.raises(RunMismatchError, match="seed"):
         folder.take_over(leadership)
 
 

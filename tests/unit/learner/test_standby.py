@@ -1,3 +1,6 @@
+import errno
+import logging
+import os
 import threading
 from dataclasses import replace
 from pathlib import Path
@@ -6,10 +9,13 @@ import numpy as np
 import pytest
 
 from hoz_dist.errors import RunMismatchError
-from learner.checkpoint import save_checkpoint
+from learner.checkpoint import UnreadableError, save_checkpoint
 from learner.core import LearnerCore
+from learner.leadership import Leadership
 from learner.run_folder import RunFolder
+from learner.service import _Turns
 from learner.standby import FREE_S, RECONNECTED_S, STILL_S, STOOD_STILL_S, ReadAhead, Sight, TakeOverRule, follow
+from tests.unit.learner.disk import unreadable
 from tests.unit.learner.making import CONFIG, gradient, push, vector
 
 STEP_S = 0.05
@@ -143,3 +149,59 @@ def test_a_run_that_another_configuration_has_begun_is_not_claimed(tmp_path: Pat
     with pytest.raises(RunMismatchError, match="seed"):
         follow(folder, lambda: (True, False), ReadAhead(folder.checkpoints), threading.Event())
     assert folder.newest_epoch() == 1
+
+
+def test_a_run_that_cannot_be_read_now_is_claimed_once_it_can_be(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level(logging.INFO)
+    monkeypatch.setattr("learner.standby.RETRY_S", 0.05)
+    folder = RunFolder(tmp_path, CONFIG)
+    with folder.claim_or_refuse() as first:
+        folder.take_over(first)
+        newest = saved(folder.checkpoints, 2)
+    ahead, stop = ReadAhead(folder.checkpoints), threading.Event()
+    for path in (newest, folder.checkpoints):
+        caplog.clear()
+        with unreadable(path):
+            threading.Timer(1.5, stop.set).start()
+            assert follow(folder, lambda: (True, False), ahead, stop) is None
+        assert folder.newest_epoch() == 1
+        assert [record.levelname for record in caplog.records] == ["WARNING"]
+        assert "goes on trying" in caplog.text
+        stop.clear()
+    leadership = follow(folder, lambda: (True, False), ahead, stop)
+    assert leadership is not None
+    with leadership:
+        run = folder.take_over(leadership, ahead.read)
+    assert run.checkpoint is not None
+    assert (leadership.epoch, run.checkpoint.version) == (2, 2)
+
+
+@pytest.mark.parametrize("standby", [True, False])
+def test_only_a_standby_follows_again_when_the_run_cannot_be_read_after_the_claim(
+    tmp_path: Path, standby: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("learner.service.RETRY_S", 0.0)
+    folder, stop = RunFolder(tmp_path, CONFIG), threading.Event()
+    turns = object.__new__(_Turns)
+    turns._folder = folder
+    epochs: list[int] = []
+
+    def lead(leadership: Leadership, *_: object) -> bool:
+        with leadership:
+            epochs.append(leadership.epoch)
+            if len(epochs) == 1:
+                raise UnreadableError(tmp_path, OSError(errno.EIO, os.strerror(errno.EIO)))
+            return False
+
+    monkeypatch.setattr(turns, "_follow", lambda ahead, _: folder.claim_or_refuse(ahead.read))
+    monkeypatch.setattr(turns, "_lead", lead)
+    ahead = ReadAhead(folder.checkpoints)
+    if standby:
+        turns.take(None, ahead, stop)
+        assert epochs == [1, 2]
+        return
+    with pytest.raises(UnreadableError, match="Cannot read"):
+        turns.take(folder.claim_or_refuse(), ahead, stop)
+    assert epochs == [1]
