@@ -4,6 +4,7 @@ Leaders follow one another in epochs, which are claimed one by one. ``epochs/000
 
     leader.lock   locked by the leader as long as it lives, so that others can tell whether it does
     writing/      where the leader writes each file of the run before it is renamed into its place
+    all-before/   says that all earlier epochs were fenced, see below
 
 A claim is the renaming of a prepared folder to ``epochs/0002``, with the lock held already: a system call that succeeds
 for one claimer only. The new leader then renames the ``writing`` folder of the one before, and thereby *fences* it:
@@ -31,6 +32,7 @@ EPOCH_FILE: Final = "epoch"
 _LOCK_FILE: Final = "leader.lock"
 _WRITING: Final = "writing"
 _FENCED: Final = "fenced"
+_ALL_BEFORE: Final = "all-before"
 _TAKEN: Final = (errno.ENOTEMPTY, errno.EEXIST)
 """What renaming a folder to the name of another one that is not empty ends with."""
 
@@ -97,8 +99,11 @@ def claim(run: Path, after: int) -> "Leadership | None":
     try:
         prepared.rename(_folder(run, epoch))
         flush_to_disk(epochs)
-        for older in range(1, epoch):
-            _fence(_folder(run, older))
+        _fence_before(run, epoch)
+        if newest_epoch(run) > epoch:
+            # Numbers are left out when checkpoints of later epochs were copied here, so that a claimer that was stopped
+            # for long finds its own still free. Who claimed the newer one may have looked for this one too early.
+            _fence(_folder(run, epoch))
         # Only now, that no older claimer can: it may have been stopped at this very line and wake up late.
         leadership.replace(run / EPOCH_FILE, lambda temporary: temporary.write_text(f"{epoch}\n", encoding="utf-8"))
     except DeposedError:
@@ -202,6 +207,19 @@ def _locked(path: Path) -> int:
         os.close(lock)
         raise
     return lock
+
+
+def _fence_before(run: Path, epoch: int) -> None:
+    """Fence the leaders of all earlier epochs, the newest first.
+
+    A fence is never taken away, and no earlier epoch can be claimed any more by one who would lead. So the claimer that
+    was done with it leaves a mark in its own epoch, at which the next ones stop; one that died before left none.
+    """
+    for older in range(epoch - 1, 0, -1):
+        _fence(_folder(run, older))
+        if (_folder(run, older) / _ALL_BEFORE).is_dir():
+            break
+    (_folder(run, epoch) / _ALL_BEFORE).mkdir(exist_ok=True)
 
 
 def _fence(folder: Path) -> None:

@@ -244,6 +244,60 @@ def test_a_claimer_that_is_killed_in_the_midst_of_it_has_deposed_the_leader_all_
             assert new.epoch == 3
 
 
+def test_a_claim_takes_no_longer_after_many_epochs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for after in range(20):
+        claimed(tmp_path, after).close()
+    fenced: list[str] = []
+    fence = module._fence
+
+    def counted(folder: Path) -> None:
+        fenced.append(folder.name)
+        fence(folder)
+
+    monkeypatch.setattr("learner.leadership._fence", counted)
+    claimed(tmp_path, 20).close()
+    assert fenced == ["0020"]
+
+
+def test_what_a_claimer_that_was_killed_did_not_fence_the_next_one_does(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def killed(_: Path) -> None:
+        raise KeyboardInterrupt
+
+    with claimed(tmp_path, 0) as old:
+        with monkeypatch.context() as patched:
+            patched.setattr("learner.leadership._fence", killed)
+            for after in (1, 2, 3):
+                with pytest.raises(KeyboardInterrupt):
+                    claim(tmp_path, after)
+        assert not old.deposed
+        with claimed(tmp_path, 4) as new:
+            assert old.deposed
+            assert not new.deposed
+        assert not list((tmp_path / "epochs").glob("000[1-4]/writing"))
+
+
+def test_a_claimer_that_was_stopped_before_an_epoch_that_was_left_out_does_not_lead(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Checkpoints of epoch 7 were copied into the folder meanwhile, and another learner went on from them."""
+    successors: list[Leadership] = []
+    rename = Path.rename
+
+    def stopped_before(path: Path, target: Path) -> Path:
+        monkeypatch.setattr(Path, "rename", rename)
+        successors.append(claimed(tmp_path, 7))
+        return rename(path, target)
+
+    monkeypatch.setattr(Path, "rename", stopped_before)
+    assert claim(tmp_path, 1) is None
+    assert not is_held(tmp_path, 2)
+    assert text(tmp_path / "epoch") == "8\n"
+    assert not successors[0].deposed
+    successors[0].close()
+
+
 def test_a_claim_on_a_folder_that_cannot_be_written_leaves_no_lock(tmp_path: Path) -> None:
     (tmp_path / "epochs").write_text("a file")
     with pytest.raises(OSError, match="epochs"):
