@@ -22,18 +22,13 @@ from hoz_dist.nav.rooms import RoomId
 from hoz_dist.waiting import Backoff, Deadline
 from hoz_dist.wire.client.discovery import find_run, find_runs
 from hoz_dist.wire.client.epochs import of_highest_epoch
+from hoz_dist.wire.protocol.answers import Refused
 from hoz_dist.wire.protocol.codec import PROTOCOL_VERSION
+from hoz_dist.wire.protocol.graph_messages import PlanReply, RoomGraphReply, SceneGraphReply
 from hoz_dist.wire.protocol.graphs import plan_of, room_graph_of, scene_graph_of
 from hoz_dist.wire.protocol.keys import SEEN_SEPARATOR, Keys
-from hoz_dist.wire.protocol.messages import (
-    ConfigReply,
-    PlanReply,
-    Refused,
-    RoomGraphReply,
-    SceneGraphReply,
-    StatusReply,
-)
 from hoz_dist.wire.protocol.rejection import Reason, RejectedError
+from hoz_dist.wire.protocol.run_messages import ConfigReply, StatusReply
 from hoz_dist.wire.transport.ask import ask, messages_in
 from hoz_dist.wire.transport.endpoint import DEFAULT_ENDPOINT
 from hoz_dist.wire.transport.session import open_client

@@ -1,13 +1,20 @@
 """The configuration of a run: all that the learner, its actors and an evaluation must agree on."""
 
 from dataclasses import asdict, dataclass, fields
-from typing import Any, Final, get_args
+from typing import Any, Final, Literal, get_args
 
 from hoz_dist.errors import InvalidValueError, UnknownNameError
 from hoz_dist.graph.checks import MAX_ZONES
 from hoz_dist.graph.planner import DEFAULT_EDGE_COST, EdgeCost
 from hoz_dist.nav.pose import PICTURE_SIZE
 from hoz_dist.policy.settings import EncoderName, Layer, Method, PolicySettings, Preset
+
+Compression = Literal["fp32", "bf16", "int8", "topk"]
+"""How gradients travel: in full, as halves, as bytes, or their largest entries alone."""
+ParametersForm = Literal["full", "delta"]
+"""How parameters travel: in full, or as the difference to a version that their reader has."""
+Source = Literal["gradients", "rollouts"]
+"""What actors push, and the learner learns from."""
 
 PRESET_LEARNING_RATES: Final[dict[Preset, float]] = {"compact": 1e-3, "paper": 1e-4}
 """Adam's learning rate at the start; the paper's is 1e-4."""
@@ -19,7 +26,7 @@ class RunConfig:
 
     Raises:
         InvalidValueError: A value is out of its range.
-        UnknownNameError: A method, preset, encoder or edge cost does not exist.
+        UnknownNameError: A value of a field with named values does not exist.
     """
 
     method: Method = "hoz"
@@ -51,6 +58,12 @@ class RunConfig:
     """Adam's learning rate at the start; falls linearly to 0 over the budget, if there is one."""
     gradient_norm: float = 1.0
     """Largest norm of a gradient: actors scale larger ones down, and the learner refuses them."""
+    learn_from: Source = "gradients"
+    """What actors push: the gradients of their rollouts, or the rollouts, whose gradients the learner computes."""
+    compress: Compression = "fp32"
+    """How gradients travel."""
+    parameters: ParametersForm = "full"
+    """How parameters travel."""
     max_lag: int = 32
     """Largest policy lag, versions, at which a gradient is applied."""
     minutes: float | None = None
@@ -65,6 +78,9 @@ class RunConfig:
             ("preset", self.preset, get_args(Preset)),
             ("encoder", self.encoder, get_args(EncoderName)),
             ("edge cost", self.edge_cost, get_args(EdgeCost)),
+            ("source to learn from", self.learn_from, get_args(Source)),
+            ("compression", self.compress, get_args(Compression)),
+            ("form of parameters", self.parameters, get_args(ParametersForm)),
             *(("layer", layer, get_args(Layer)) for layer in self.without),
         ):
             if value not in known:
@@ -98,7 +114,7 @@ class RunConfig:
 
         Raises:
             InvalidValueError: A field is missing, unknown, of the wrong type or out of range.
-            UnknownNameError: A method, preset, encoder or edge cost does not exist.
+            UnknownNameError: A value of a field with named values does not exist.
         """
         known = {field.name: field for field in fields(cls)}
         if not isinstance(values, dict) or set(values) != set(known):

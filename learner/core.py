@@ -15,7 +15,8 @@ from hoz_dist.config import RunConfig
 from hoz_dist.errors import InvalidValueError
 from hoz_dist.graph.room_graph import RoomGraph
 from hoz_dist.nav.categories import TARGETS
-from hoz_dist.wire.protocol.messages import Accepted, Busy, GradientPush, Refused, RoomGraphPush
+from hoz_dist.wire.protocol.answers import Accepted, Busy, Refused
+from hoz_dist.wire.protocol.pushes import GradientPush, RoomGraphPush
 from hoz_dist.wire.protocol.rejection import Reason, RejectedError
 from learner.checkpoint import Checkpoint
 from learner.clock import TrainingClock

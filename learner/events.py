@@ -3,7 +3,8 @@
 from dataclasses import dataclass
 
 from hoz_dist.nav.rooms import RoomId
-from hoz_dist.wire.protocol.messages import Accepted, Busy, EpisodesPush, GradientPush, Refused, RoomGraphPush
+from hoz_dist.wire.protocol.answers import Accepted, Busy, Refused
+from hoz_dist.wire.protocol.pushes import EpisodesPush, GradientPush, RoomGraphPush
 from learner.replay import UpdateRecord
 
 # Events. `request` names the request that a `Reply` answers; the shell chooses it.

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from hoz_dist.wire.membership.liveliness import Members
-from hoz_dist.wire.protocol.messages import LeftProcess, ProcessStatus
+from hoz_dist.wire.protocol.run_messages import LeftProcess, ProcessStatus
 
 
 def live_processes(

@@ -17,17 +17,12 @@ from hoz_dist.graph.scene_graph import SceneGraph
 from hoz_dist.nav.categories import TARGETS
 from hoz_dist.outage import Outage
 from hoz_dist.wire.membership.liveliness import Member, Members
+from hoz_dist.wire.protocol.answers import Refused
 from hoz_dist.wire.protocol.keys import Keys
-from hoz_dist.wire.protocol.messages import (
-    ConfigReply,
-    EpisodesPush,
-    GradientPush,
-    Refused,
-    RoomGraphPush,
-    StatusReply,
-)
+from hoz_dist.wire.protocol.pushes import EpisodesPush, GradientPush, RoomGraphPush
 from hoz_dist.wire.protocol.rejection import Reason
 from hoz_dist.wire.protocol.rejections import Rejections
+from hoz_dist.wire.protocol.run_messages import ConfigReply, StatusReply
 from hoz_dist.wire.serving.inbox import Inbox, Request
 from hoz_dist.wire.serving.parameters import ParametersPublisher
 from hoz_dist.wire.serving.server import Server

@@ -4,25 +4,12 @@ import numpy as np
 
 from hoz_dist.nav.episode import EpisodeResult
 from hoz_dist.nav.rooms import RoomId
+from hoz_dist.wire.protocol.answers import Accepted, Busy, Refused
+from hoz_dist.wire.protocol.graph_messages import PlanReply, RoomGraphReply, SceneGraphReply
 from hoz_dist.wire.protocol.message import Message
-from hoz_dist.wire.protocol.messages import (
-    Accepted,
-    Busy,
-    ConfigReply,
-    EpisodesPush,
-    GradientPush,
-    LeftProcess,
-    ParametersHead,
-    ParametersShard,
-    PlanReply,
-    ProcessStatus,
-    Refused,
-    RoomGraphPush,
-    RoomGraphReply,
-    SceneGraphReply,
-    StatusReply,
-)
-from hoz_dist.wire.protocol.parameters import head_of
+from hoz_dist.wire.protocol.parameters import ParametersHead, ParametersShard, head_of
+from hoz_dist.wire.protocol.pushes import EpisodesPush, GradientPush, RoomGraphPush
+from hoz_dist.wire.protocol.run_messages import ConfigReply, LeftProcess, ProcessStatus, StatusReply
 
 VECTOR = np.array([0.5, -0.25], np.float32)
 HEAD: ParametersHead = head_of(2, 6, VECTOR)

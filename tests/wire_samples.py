@@ -10,24 +10,14 @@ from hoz_dist.graph.scene_graph import SceneGraph
 from hoz_dist.nav.categories import TARGETS
 from hoz_dist.nav.episode import EpisodeResult
 from hoz_dist.nav.rooms import RoomId
+from hoz_dist.wire.protocol.answers import Accepted, Busy, Refused
+from hoz_dist.wire.protocol.graph_messages import PlanReply
 from hoz_dist.wire.protocol.graphs import room_graph_reply, scene_graph_reply
 from hoz_dist.wire.protocol.keys import Keys
 from hoz_dist.wire.protocol.message import Message
-from hoz_dist.wire.protocol.messages import (
-    Accepted,
-    Busy,
-    ConfigReply,
-    EpisodesPush,
-    GradientPush,
-    LeftProcess,
-    ParametersHead,
-    ParametersShard,
-    PlanReply,
-    ProcessStatus,
-    Refused,
-    RoomGraphPush,
-    StatusReply,
-)
+from hoz_dist.wire.protocol.parameters import ParametersHead, ParametersShard
+from hoz_dist.wire.protocol.pushes import EpisodesPush, GradientPush, RoomGraphPush
+from hoz_dist.wire.protocol.run_messages import ConfigReply, LeftProcess, ProcessStatus, StatusReply
 from hoz_dist.wire.serving.inbox import Inbox
 from hoz_dist.wire.serving.server import Server
 from hoz_dist.wire.serving.snapshots import Snapshots

@@ -23,9 +23,10 @@ from hoz_dist.sim.batch_env import BatchEnv
 from hoz_dist.sim.view_source import ViewSource
 from hoz_dist.sim.view_store import ViewStore
 from hoz_dist.waiting import StoppedError
+from hoz_dist.wire.protocol.answers import Accepted, Refused
+from hoz_dist.wire.protocol.graph_messages import SceneGraphReply
 from hoz_dist.wire.protocol.graphs import scene_graph_of
 from hoz_dist.wire.protocol.message import MAX_EPISODES
-from hoz_dist.wire.protocol.messages import Accepted, Refused, SceneGraphReply
 from hoz_dist.wire.protocol.rejection import Reason
 from workers.collector import Collector
 from workers.link import LearnerLink

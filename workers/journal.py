@@ -10,7 +10,8 @@ from pathlib import Path
 
 from hoz_dist.closing import Closing
 from hoz_dist.errors import InvalidValueError
-from hoz_dist.wire.protocol.messages import Accepted, EpisodesPush, GradientPush, Push, RoomGraphPush
+from hoz_dist.wire.protocol.answers import Accepted
+from hoz_dist.wire.protocol.pushes import EpisodesPush, GradientPush, Push, RoomGraphPush
 
 
 class Journal(Closing):

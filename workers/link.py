@@ -24,18 +24,12 @@ from hoz_dist.wire.client.epochs import Epochs
 from hoz_dist.wire.client.parameters import ParametersFollower
 from hoz_dist.wire.client.push import Pusher
 from hoz_dist.wire.membership.liveliness import Member, declare_alive, host_name
+from hoz_dist.wire.protocol.answers import Accepted, Refused
+from hoz_dist.wire.protocol.graph_messages import SceneGraphReply
 from hoz_dist.wire.protocol.keys import Keys
 from hoz_dist.wire.protocol.message import MAX_EPISODES
-from hoz_dist.wire.protocol.messages import (
-    Accepted,
-    EpisodesPush,
-    GradientPush,
-    Push,
-    Refused,
-    RoomGraphPush,
-    SceneGraphReply,
-)
 from hoz_dist.wire.protocol.parameters import Parameters
+from hoz_dist.wire.protocol.pushes import EpisodesPush, GradientPush, Push, RoomGraphPush
 from hoz_dist.wire.protocol.rejection import Reason
 from hoz_dist.wire.transport.publishing import NewestSubscriber
 from hoz_dist.wire.transport.session import Session

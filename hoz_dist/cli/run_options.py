@@ -51,6 +51,25 @@ _OPTIONS: Final = (
         "[default: 0.001 compact, 0.0001 paper]",
     ),
     click.option(
+        "--learn-from",
+        default=RunConfig.learn_from,
+        show_default=True,
+        help="What actors push: gradients, or rollouts (some tens of bytes a frame), whose gradients the learner then "
+        "computes itself.",
+    ),
+    click.option(
+        "--compress",
+        default=RunConfig.compress,
+        show_default=True,
+        help="How gradients travel: fp32 (4 bytes a parameter), bf16 (2), int8 (1) or topk (the largest 1%).",
+    ),
+    click.option(
+        "--parameters",
+        default=RunConfig.parameters,
+        show_default=True,
+        help="How parameters travel: full (4 bytes a parameter), or delta (1), the difference to an earlier version.",
+    ),
+    click.option(
         "--max-lag",
         type=int,
         default=RunConfig.max_lag,

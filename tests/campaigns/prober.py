@@ -19,9 +19,10 @@ import click
 from hoz_dist.cli.child import die_with_parent
 from hoz_dist.wire.membership.liveliness import Members
 from hoz_dist.wire.protocol.codec import decode
+from hoz_dist.wire.protocol.graph_messages import SceneGraphReply
 from hoz_dist.wire.protocol.keys import Keys
-from hoz_dist.wire.protocol.messages import SceneGraphReply, StatusReply
 from hoz_dist.wire.protocol.rejection import RejectedError
+from hoz_dist.wire.protocol.run_messages import StatusReply
 from hoz_dist.wire.transport.ask import ask
 from hoz_dist.wire.transport.session import Session, open_client
 

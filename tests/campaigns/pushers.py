@@ -23,9 +23,11 @@ import numpy as np
 import zenoh
 
 from hoz_dist.cli.child import die_with_parent
+from hoz_dist.wire.protocol.answers import Accepted, Busy, PushReply, Refused
 from hoz_dist.wire.protocol.codec import checksum, decode, encode
 from hoz_dist.wire.protocol.keys import Keys
-from hoz_dist.wire.protocol.messages import Accepted, Busy, GradientPush, ParametersHead, PushReply, Refused
+from hoz_dist.wire.protocol.parameters import ParametersHead
+from hoz_dist.wire.protocol.pushes import GradientPush
 from hoz_dist.wire.transport.ask import ask
 from hoz_dist.wire.transport.session import open_client
 

@@ -23,9 +23,10 @@ from hoz_dist.nav.rooms import RoomId
 from hoz_dist.wire.client.parameters import ParametersFollower
 from hoz_dist.wire.client.push import Pusher
 from hoz_dist.wire.membership.liveliness import Member, declare_alive
+from hoz_dist.wire.protocol.answers import Accepted, Refused
 from hoz_dist.wire.protocol.keys import Keys
-from hoz_dist.wire.protocol.messages import Accepted, EpisodesPush, GradientPush, Refused, RoomGraphPush
 from hoz_dist.wire.protocol.parameters import Parameters
+from hoz_dist.wire.protocol.pushes import EpisodesPush, GradientPush, RoomGraphPush
 from hoz_dist.wire.transport.environment import child_environment
 from hoz_dist.wire.transport.session import open_client
 from learner.checkpoint import FOLDER, Stamp, checkpoint_files

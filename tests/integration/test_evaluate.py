@@ -13,7 +13,7 @@ from hoz_dist.config import RunConfig
 from hoz_dist.nav.categories import TARGETS
 from hoz_dist.nav.rooms import RoomId
 from hoz_dist.policy.parameters import initial_parameters
-from hoz_dist.wire.protocol.messages import RoomGraphPush
+from hoz_dist.wire.protocol.pushes import RoomGraphPush
 from learner.checkpoint import save_checkpoint
 from learner.core import LearnerCore
 from learner.events import RoomGraphReceived

@@ -20,7 +20,8 @@ from hoz_dist.graph.planner import plan_for
 from hoz_dist.graph.scene_graph import merge_rooms
 from hoz_dist.policy.parameters import initial_parameters
 from hoz_dist.wire.membership.liveliness import host_name
-from hoz_dist.wire.protocol.messages import Accepted, GradientPush, Refused
+from hoz_dist.wire.protocol.answers import Accepted, Refused
+from hoz_dist.wire.protocol.pushes import GradientPush
 from hoz_dist.wire.protocol.rejection import Reason
 from learner.checkpoint import load_checkpoint
 from learner.core import LearnerCore

@@ -10,7 +10,7 @@ import pytest
 
 from hoz_dist.cli.main import run as hoz_dist_main
 from hoz_dist.client import HozClient
-from hoz_dist.wire.protocol.messages import Accepted, Refused
+from hoz_dist.wire.protocol.answers import Accepted, Refused
 from hoz_dist.wire.protocol.rejection import Reason
 from learner.checkpoint import load_checkpoint
 from learner.leadership import claim

@@ -5,7 +5,7 @@ import threading
 from hoz_dist.errors import InvalidValueError, NotFoundError
 from hoz_dist.waiting import Backoff, Deadline
 from hoz_dist.wire.protocol.keys import ALL_CONFIGS, Keys
-from hoz_dist.wire.protocol.messages import ConfigReply
+from hoz_dist.wire.protocol.run_messages import ConfigReply
 from hoz_dist.wire.transport.ask import ask, messages_in
 from hoz_dist.wire.transport.session import Session
 

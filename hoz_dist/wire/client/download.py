@@ -5,8 +5,7 @@ import xxhash
 from numpy.typing import NDArray
 
 from hoz_dist.wire.protocol.message import SHARD_ELEMENTS
-from hoz_dist.wire.protocol.messages import ParametersHead, ParametersShard
-from hoz_dist.wire.protocol.parameters import Parameters
+from hoz_dist.wire.protocol.parameters import Parameters, ParametersHead, ParametersShard
 from hoz_dist.wire.protocol.rejection import Reason, RejectedError
 
 

@@ -12,9 +12,9 @@ from hoz_dist.waiting import Backoff, Deadline
 from hoz_dist.wire.client.asking import Asking
 from hoz_dist.wire.client.download import Download
 from hoz_dist.wire.client.epochs import AnotherRunError, Epochs
+from hoz_dist.wire.protocol.answers import Busy, Refused
 from hoz_dist.wire.protocol.keys import Keys
-from hoz_dist.wire.protocol.messages import Busy, ParametersHead, ParametersShard, Refused
-from hoz_dist.wire.protocol.parameters import Parameters
+from hoz_dist.wire.protocol.parameters import Parameters, ParametersHead, ParametersShard
 from hoz_dist.wire.protocol.rejection import RejectedError
 from hoz_dist.wire.transport.publishing import NewestSubscriber
 

@@ -11,8 +11,9 @@ from hoz_dist.errors import ConnectionFailedError
 from hoz_dist.waiting import FIRST_TRY_S, Backoff, Deadline
 from hoz_dist.wire.client.asking import Asking
 from hoz_dist.wire.client.epochs import Epochs
+from hoz_dist.wire.protocol.answers import Accepted, Busy, Refused
 from hoz_dist.wire.protocol.codec import checksum, encode
-from hoz_dist.wire.protocol.messages import Accepted, Busy, GradientPush, Push, Refused
+from hoz_dist.wire.protocol.pushes import GradientPush, Push
 from hoz_dist.wire.protocol.rejection import Reason
 from hoz_dist.wire.transport.session import Session
 from hoz_dist.wire.transport.shared_memory import SharedMemory

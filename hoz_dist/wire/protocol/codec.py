@@ -11,23 +11,13 @@ from typing import Final, TypeVar
 import msgpack
 import xxhash
 
+from hoz_dist.wire.protocol.answers import Accepted, Busy, Refused
+from hoz_dist.wire.protocol.graph_messages import PlanReply, RoomGraphReply, SceneGraphReply
 from hoz_dist.wire.protocol.message import Message
-from hoz_dist.wire.protocol.messages import (
-    Accepted,
-    Busy,
-    ConfigReply,
-    EpisodesPush,
-    GradientPush,
-    ParametersHead,
-    ParametersShard,
-    PlanReply,
-    Refused,
-    RoomGraphPush,
-    RoomGraphReply,
-    SceneGraphReply,
-    StatusReply,
-)
+from hoz_dist.wire.protocol.parameters import ParametersHead, ParametersShard
+from hoz_dist.wire.protocol.pushes import EpisodesPush, GradientPush, RoomGraphPush
 from hoz_dist.wire.protocol.rejection import OtherVersionError, Reason, RejectedError, shown
+from hoz_dist.wire.protocol.run_messages import ConfigReply, StatusReply
 from hoz_dist.wire.protocol.schema import MOST_CHARACTERS, MOST_ELEMENTS
 
 PROTOCOL_VERSION: Final = 1

@@ -5,7 +5,7 @@ from hoz_dist.graph.room_graph import RoomGraph
 from hoz_dist.graph.scene_graph import SceneGraph
 from hoz_dist.nav.categories import TARGETS
 from hoz_dist.nav.rooms import RoomId
-from hoz_dist.wire.protocol.messages import PlanReply, RoomGraphReply, SceneGraphReply
+from hoz_dist.wire.protocol.graph_messages import PlanReply, RoomGraphReply, SceneGraphReply
 
 
 def scene_graph_reply(graph: SceneGraph, epoch: int) -> SceneGraphReply:

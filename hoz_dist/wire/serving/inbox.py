@@ -12,7 +12,8 @@ from typing import Final
 import zenoh
 
 from hoz_dist.closing import Closing
-from hoz_dist.wire.protocol.messages import Busy, Push, PushReply, Refused
+from hoz_dist.wire.protocol.answers import Busy, PushReply, Refused
+from hoz_dist.wire.protocol.pushes import Push
 from hoz_dist.wire.protocol.rejection import Reason
 from hoz_dist.wire.protocol.rejections import Rejections
 from hoz_dist.wire.transport.queryable import answer

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from zenoh import KeyExpr, Query, Session
 
 from hoz_dist.closing import Closing
+from hoz_dist.wire.protocol.answers import Busy
 from hoz_dist.wire.protocol.keys import NAME_PATTERN, Keys
 from hoz_dist.wire.protocol.message import SHARD_ELEMENTS, Message
-from hoz_dist.wire.protocol.messages import Busy, ParametersHead, ParametersShard
-from hoz_dist.wire.protocol.parameters import Parameters, head_of
+from hoz_dist.wire.protocol.parameters import Parameters, ParametersHead, ParametersShard, head_of
 from hoz_dist.wire.protocol.rejection import Reason, RejectedError, shown
 from hoz_dist.wire.protocol.rejections import Rejections
 from hoz_dist.wire.serving.versions import Versions

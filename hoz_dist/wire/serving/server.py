@@ -14,11 +14,12 @@ from hoz_dist.closing import Closing
 from hoz_dist.errors import HozError
 from hoz_dist.graph.room_graph import RoomGraph
 from hoz_dist.graph.scene_graph import SceneGraph
+from hoz_dist.wire.protocol.answers import Refused
 from hoz_dist.wire.protocol.codec import checksum, decode, encode
 from hoz_dist.wire.protocol.graphs import room_graph_reply, scene_graph_reply
 from hoz_dist.wire.protocol.keys import Keys, sender_of
 from hoz_dist.wire.protocol.message import Message
-from hoz_dist.wire.protocol.messages import EpisodesPush, GradientPush, Push, Refused, RoomGraphPush
+from hoz_dist.wire.protocol.pushes import EpisodesPush, GradientPush, Push, RoomGraphPush
 from hoz_dist.wire.protocol.rejection import Reason, RejectedError
 from hoz_dist.wire.protocol.rejections import Rejections
 from hoz_dist.wire.serving.inbox import Inbox, Reaper, Request

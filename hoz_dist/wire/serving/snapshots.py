@@ -9,9 +9,10 @@ from hoz_dist.errors import InvalidValueError, NotFoundError
 from hoz_dist.graph.planner import EdgeCost, plan_for
 from hoz_dist.nav.categories import SCENES, scene_index
 from hoz_dist.nav.rooms import RoomId
+from hoz_dist.wire.protocol.graph_messages import PlanReply, RoomGraphReply, SceneGraphReply
 from hoz_dist.wire.protocol.graphs import plan_reply, scene_graph_of
 from hoz_dist.wire.protocol.keys import SEEN_SEPARATOR
-from hoz_dist.wire.protocol.messages import ConfigReply, PlanReply, RoomGraphReply, SceneGraphReply, StatusReply
+from hoz_dist.wire.protocol.run_messages import ConfigReply, StatusReply
 
 GraphReply = SceneGraphReply | RoomGraphReply
 

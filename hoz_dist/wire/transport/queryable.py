@@ -9,10 +9,10 @@ from zenoh import Query, Session
 from zenoh.handlers import FifoChannel
 
 from hoz_dist.errors import HozError, NotFoundError, UnknownNameError
+from hoz_dist.wire.protocol.answers import Busy, Refused
 from hoz_dist.wire.protocol.codec import encode
 from hoz_dist.wire.protocol.keys import NOBODY
 from hoz_dist.wire.protocol.message import Message
-from hoz_dist.wire.protocol.messages import Busy, Refused
 from hoz_dist.wire.protocol.rejection import Reason, RejectedError, plain
 from hoz_dist.wire.protocol.rejections import Rejections
 from hoz_dist.wire.transport.draining import Drain

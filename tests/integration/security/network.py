@@ -12,8 +12,9 @@ from typing import Final
 import zenoh
 
 from hoz_dist.security.key_folders import RouterPlace, create_authority, issue_keys, withdraw_key
+from hoz_dist.wire.protocol.answers import Accepted
 from hoz_dist.wire.protocol.codec import checksum, encode
-from hoz_dist.wire.protocol.messages import Accepted, Push
+from hoz_dist.wire.protocol.pushes import Push
 from hoz_dist.wire.serving.parameters import ParametersPublisher
 from hoz_dist.wire.serving.server import Server
 from hoz_dist.wire.serving.snapshots import Snapshots

@@ -18,16 +18,11 @@ from hoz_dist.client import HozClient
 from hoz_dist.errors import ConnectionFailedError, NotFoundError
 from hoz_dist.wire.membership.liveliness import Member, Members, declare_alive
 from hoz_dist.wire.protocol.codec import encode
+from hoz_dist.wire.protocol.graph_messages import SceneGraphReply
 from hoz_dist.wire.protocol.graphs import scene_graph_reply
 from hoz_dist.wire.protocol.message import Message
-from hoz_dist.wire.protocol.messages import (
-    EpisodesPush,
-    GradientPush,
-    ParametersHead,
-    Push,
-    RoomGraphPush,
-    SceneGraphReply,
-)
+from hoz_dist.wire.protocol.parameters import ParametersHead
+from hoz_dist.wire.protocol.pushes import EpisodesPush, GradientPush, Push, RoomGraphPush
 from hoz_dist.wire.transport.publishing import NewestPublisher, NewestSubscriber
 from hoz_dist.wire.transport.session import Session
 from tests import wire_samples as samples

@@ -12,7 +12,7 @@ import pytest
 from hoz_dist.cli.main import run
 from hoz_dist.client import HozClient
 from hoz_dist.errors import ConnectionFailedError
-from hoz_dist.wire.protocol.messages import Accepted
+from hoz_dist.wire.protocol.answers import Accepted
 from hoz_dist.wire.transport.credentials import load_credentials
 from hoz_dist.wire.transport.session import open_client
 from tests.integration.commands import HozDist, hoz_dist

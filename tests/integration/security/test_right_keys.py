@@ -8,8 +8,10 @@ import pytest
 from hoz_dist.client import HozClient
 from hoz_dist.wire.client.parameters import ParametersFollower
 from hoz_dist.wire.membership.liveliness import Member, Members, declare_alive
+from hoz_dist.wire.protocol.answers import Accepted
 from hoz_dist.wire.protocol.codec import decode
-from hoz_dist.wire.protocol.messages import Accepted, EpisodesPush, GradientPush, Push, RoomGraphPush, SceneGraphReply
+from hoz_dist.wire.protocol.graph_messages import SceneGraphReply
+from hoz_dist.wire.protocol.pushes import EpisodesPush, GradientPush, Push, RoomGraphPush
 from hoz_dist.wire.transport.publishing import NewestSubscriber
 from tests import wire_samples as samples
 from tests.integration.security.network import KEYS, Network

@@ -14,7 +14,7 @@ import zenoh
 from hoz_dist.errors import ConnectionFailedError, InvalidValueError
 from hoz_dist.security.authority import Authority, KeyPair
 from hoz_dist.security.key_folders import AUTHORITY_KEY_FILE
-from hoz_dist.wire.protocol.messages import GradientPush
+from hoz_dist.wire.protocol.pushes import GradientPush
 from hoz_dist.wire.transport.credentials import (
     AUTHORITY_FILE,
     CERTIFICATE_FILE,

@@ -5,11 +5,9 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from hoz_dist.wire.client.push import Pusher
+from hoz_dist.wire.protocol.answers import PushReply
 from hoz_dist.wire.protocol.codec import checksum, encode
-from hoz_dist.wire.protocol.messages import (
-    Push,
-    PushReply,
-)
+from hoz_dist.wire.protocol.pushes import Push
 from hoz_dist.wire.serving.inbox import Inbox, Request
 from hoz_dist.wire.transport.ask import ask
 from hoz_dist.wire.transport.session import Session

@@ -16,11 +16,8 @@ from hoz_dist.errors import ConnectionFailedError
 from hoz_dist.wire.client.parameters import ParametersFollower
 from hoz_dist.wire.client.push import Pusher
 from hoz_dist.wire.membership.liveliness import Member, Members, declare_alive
+from hoz_dist.wire.protocol.answers import Accepted, PushReply
 from hoz_dist.wire.protocol.codec import decode
-from hoz_dist.wire.protocol.messages import (
-    Accepted,
-    PushReply,
-)
 from hoz_dist.wire.serving.parameters import ParametersPublisher
 from hoz_dist.wire.serving.server import Server
 from hoz_dist.wire.serving.snapshots import Snapshots
@@ -34,7 +31,7 @@ pytestmark = pytest.mark.integration
 _LEARNER = """
 import sys
 from tests import wire_samples as samples
-from hoz_dist.wire.protocol.messages import Accepted
+from hoz_dist.wire.protocol.answers import Accepted
 with samples.serving(sys.argv[1], epoch=int(sys.argv[2])) as (server, session):
     print("ready", flush=True)
     while True:

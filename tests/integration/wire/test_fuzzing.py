@@ -10,10 +10,11 @@ import pytest
 from hoz_dist.client import HozClient
 from hoz_dist.nav.categories import TARGETS
 from hoz_dist.nav.rooms import RoomId
+from hoz_dist.wire.protocol.answers import Accepted, Refused
 from hoz_dist.wire.protocol.codec import decode, encode
 from hoz_dist.wire.protocol.keys import Keys
-from hoz_dist.wire.protocol.messages import Accepted, EpisodesPush, GradientPush, Refused, RoomGraphPush
 from hoz_dist.wire.protocol.parameters import Parameters
+from hoz_dist.wire.protocol.pushes import EpisodesPush, GradientPush, RoomGraphPush
 from hoz_dist.wire.protocol.rejection import Reason, RejectedError
 from hoz_dist.wire.transport.ask import ask
 from hoz_dist.wire.transport.session import Session, open_client

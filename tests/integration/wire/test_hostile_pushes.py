@@ -6,11 +6,8 @@ import pytest
 import zenoh
 
 from hoz_dist.nav.rooms import RoomId
+from hoz_dist.wire.protocol.answers import Accepted, Refused
 from hoz_dist.wire.protocol.codec import decode, encode
-from hoz_dist.wire.protocol.messages import (
-    Accepted,
-    Refused,
-)
 from hoz_dist.wire.serving.server import Server
 from hoz_dist.wire.serving.snapshots import Snapshots
 from hoz_dist.wire.transport.ask import ask

@@ -17,8 +17,10 @@ from hoz_dist.nav.categories import TARGETS
 from hoz_dist.waiting import StoppedError
 from hoz_dist.wire.client import epochs
 from hoz_dist.wire.client.epochs import AnotherRunError
+from hoz_dist.wire.protocol.answers import Accepted, PushReply, Refused
 from hoz_dist.wire.protocol.message import MAX_EPISODES
-from hoz_dist.wire.protocol.messages import Accepted, ConfigReply, EpisodesPush, Push, PushReply, Refused
+from hoz_dist.wire.protocol.pushes import EpisodesPush, Push
+from hoz_dist.wire.protocol.run_messages import ConfigReply
 from hoz_dist.wire.serving.parameters import ParametersPublisher
 from hoz_dist.wire.serving.server import Server
 from hoz_dist.wire.serving.snapshots import Snapshots

@@ -12,8 +12,8 @@ from hoz_dist.client import HozClient
 from hoz_dist.wire.client.discovery import find_run
 from hoz_dist.wire.client.parameters import ParametersFollower
 from hoz_dist.wire.client.push import Pusher
+from hoz_dist.wire.protocol.answers import Refused
 from hoz_dist.wire.protocol.codec import decode, encode
-from hoz_dist.wire.protocol.messages import Refused
 from hoz_dist.wire.protocol.rejection import OtherVersionError
 from hoz_dist.wire.serving.server import Server
 from hoz_dist.wire.transport.queryable import declare_queryable

@@ -9,13 +9,11 @@ from hoz_dist.errors import ConnectionFailedError
 from hoz_dist.wire.client.epochs import AnotherRunError
 from hoz_dist.wire.client.parameters import ParametersFollower
 from hoz_dist.wire.membership.liveliness import Members
+from hoz_dist.wire.protocol.answers import Refused
 from hoz_dist.wire.protocol.codec import decode
+from hoz_dist.wire.protocol.graph_messages import SceneGraphReply
 from hoz_dist.wire.protocol.message import SHARD_ELEMENTS
-from hoz_dist.wire.protocol.messages import (
-    ParametersHead,
-    Refused,
-    SceneGraphReply,
-)
+from hoz_dist.wire.protocol.parameters import ParametersHead
 from hoz_dist.wire.serving.parameters import ParametersPublisher
 from hoz_dist.wire.serving.server import Server
 from hoz_dist.wire.serving.snapshots import Snapshots

@@ -9,13 +9,8 @@ import pytest
 from hoz_dist.errors import ConnectionFailedError
 from hoz_dist.waiting import StoppedError
 from hoz_dist.wire.client.push import Pusher
+from hoz_dist.wire.protocol.answers import Accepted, Busy, PushReply, Refused
 from hoz_dist.wire.protocol.codec import decode, encode
-from hoz_dist.wire.protocol.messages import (
-    Accepted,
-    Busy,
-    PushReply,
-    Refused,
-)
 from hoz_dist.wire.protocol.rejection import Reason
 from hoz_dist.wire.serving.inbox import Inbox
 from hoz_dist.wire.serving.server import Server

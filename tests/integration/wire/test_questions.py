@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from hoz_dist.wire.protocol.answers import Refused
 from hoz_dist.wire.protocol.codec import decode
-from hoz_dist.wire.protocol.messages import Refused
 from hoz_dist.wire.serving import server as serving
 from hoz_dist.wire.serving.parameters import ParametersPublisher
 from hoz_dist.wire.serving.server import Server

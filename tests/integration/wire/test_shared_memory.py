@@ -15,7 +15,8 @@ from zenoh.handlers import FifoChannel
 
 from hoz_dist.wire.client.parameters import ParametersFollower
 from hoz_dist.wire.client.push import Pusher
-from hoz_dist.wire.protocol.messages import Accepted, GradientPush
+from hoz_dist.wire.protocol.answers import Accepted
+from hoz_dist.wire.protocol.pushes import GradientPush
 from hoz_dist.wire.serving.parameters import ParametersPublisher
 from hoz_dist.wire.serving.server import Server
 from hoz_dist.wire.serving.snapshots import Snapshots

@@ -15,7 +15,8 @@ from hoz_dist.wire.client.discovery import find_run, find_runs
 from hoz_dist.wire.client.epochs import Epochs
 from hoz_dist.wire.client.parameters import ParametersFollower
 from hoz_dist.wire.client.push import Pusher
-from hoz_dist.wire.protocol.messages import Accepted, GradientPush, Push, PushReply, Refused
+from hoz_dist.wire.protocol.answers import Accepted, PushReply, Refused
+from hoz_dist.wire.protocol.pushes import GradientPush, Push
 from hoz_dist.wire.serving.parameters import ParametersPublisher
 from hoz_dist.wire.serving.server import Server
 from hoz_dist.wire.serving.snapshots import Snapshots

@@ -8,8 +8,8 @@ from contextlib import ExitStack
 import pytest
 
 from hoz_dist.wire.client.push import Pusher
+from hoz_dist.wire.protocol.answers import Accepted, Busy, PushReply
 from hoz_dist.wire.protocol.codec import decode
-from hoz_dist.wire.protocol.messages import Accepted, Busy, PushReply
 from hoz_dist.wire.serving.inbox import MOST_WAITING, Inbox
 from hoz_dist.wire.serving.server import Server
 from hoz_dist.wire.transport.session import Session, open_client

@@ -108,7 +108,7 @@ def test_what_is_to_be_watched_is_there() -> None:
     known = set(PROGRAM) | {reason.value for reason in Reason}
     attributes = {
         target.target.id
-        for node in ast.walk(ast.parse((ROOT / "hoz_dist" / "wire" / "protocol" / "messages.py").read_text()))
+        for node in ast.walk(ast.parse((ROOT / "hoz_dist" / "wire" / "protocol" / "run_messages.py").read_text()))
         if isinstance(node, ast.ClassDef)
         for target in node.body
         if isinstance(target, ast.AnnAssign) and isinstance(target.target, ast.Name)

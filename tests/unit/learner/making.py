@@ -10,7 +10,7 @@ from hoz_dist.graph.room_graph import RoomGraph
 from hoz_dist.nav.categories import TARGETS
 from hoz_dist.nav.episode import EpisodeResult
 from hoz_dist.nav.rooms import RoomId
-from hoz_dist.wire.protocol.messages import EpisodesPush, GradientPush, RoomGraphPush
+from hoz_dist.wire.protocol.pushes import EpisodesPush, GradientPush, RoomGraphPush
 from learner.core import LearnerCore
 from learner.events import Effect, Event, GradientReceived, Reply
 from learner.leadership import Leadership, claim, newest_epoch

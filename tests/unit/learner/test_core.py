@@ -9,7 +9,8 @@ import torch
 from hoz_dist.config import RunConfig
 from hoz_dist.errors import InvalidValueError
 from hoz_dist.nav.categories import TARGETS
-from hoz_dist.wire.protocol.messages import Accepted, Busy, GradientPush, Refused
+from hoz_dist.wire.protocol.answers import Accepted, Busy, Refused
+from hoz_dist.wire.protocol.pushes import GradientPush
 from hoz_dist.wire.protocol.rejection import Reason
 from learner.clock import LONGEST_GAP_S
 from learner.core import GRAPH_CHECKPOINT_SECONDS, LearnerCore

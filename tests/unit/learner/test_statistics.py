@@ -2,7 +2,7 @@ import pytest
 
 from hoz_dist.nav.episode import EpisodeResult
 from hoz_dist.nav.rooms import RoomId
-from hoz_dist.wire.protocol.messages import EpisodesPush
+from hoz_dist.wire.protocol.pushes import EpisodesPush
 from hoz_dist.wire.protocol.rejection import RejectedError
 from learner.statistics import MAX_ACTORS, SUCCESS_WINDOW, LagSummary, Rate, Statistics
 

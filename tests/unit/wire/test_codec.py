@@ -9,10 +9,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from hoz_dist.wire.protocol.answers import Accepted, Refused
 from hoz_dist.wire.protocol.codec import MESSAGES, PROTOCOL_VERSION, checksum, decode, encode
 from hoz_dist.wire.protocol.message import Message
-from hoz_dist.wire.protocol.messages import Accepted, ConfigReply, EpisodesPush, GradientPush, Refused, RoomGraphPush
+from hoz_dist.wire.protocol.pushes import EpisodesPush, GradientPush, RoomGraphPush
 from hoz_dist.wire.protocol.rejection import Reason, RejectedError
+from hoz_dist.wire.protocol.run_messages import ConfigReply
 from tests import wire_samples as samples
 
 KINDS = tuple(MESSAGES.values())

@@ -11,7 +11,7 @@ from hoz_dist.wire.client.epochs import ANOTHER_RUN_S
 from hoz_dist.wire.protocol.codec import MESSAGES, PROTOCOL_VERSION, checksum, decode, encode
 from hoz_dist.wire.protocol.keys import Keys
 from hoz_dist.wire.protocol.message import SHARD_ELEMENTS, SMALL_BYTES, Message
-from hoz_dist.wire.protocol.messages import ParametersHead, ParametersShard
+from hoz_dist.wire.protocol.parameters import ParametersHead, ParametersShard
 from hoz_dist.wire.protocol.rejection import Reason
 from hoz_dist.wire.protocol.rejections import LOG_EVERY_S, MOST_LINES
 from hoz_dist.wire.serving.inbox import LONGEST_WAIT_S, MOST_WAITING, MOST_WAITING_BYTES

@@ -3,8 +3,7 @@ import pytest
 
 from hoz_dist.wire.client.download import Download
 from hoz_dist.wire.protocol.message import SHARD_ELEMENTS
-from hoz_dist.wire.protocol.messages import ParametersHead, ParametersShard
-from hoz_dist.wire.protocol.parameters import head_of
+from hoz_dist.wire.protocol.parameters import ParametersHead, ParametersShard, head_of
 from hoz_dist.wire.protocol.rejection import Reason, RejectedError
 
 VECTOR = np.arange(2 * SHARD_ELEMENTS + 5, dtype=np.float32)

@@ -2,7 +2,7 @@ import pytest
 
 from hoz_dist.wire.client import epochs
 from hoz_dist.wire.client.epochs import AnotherRunError, Epochs, of_highest_epoch
-from hoz_dist.wire.protocol.messages import Accepted, Busy, PushReply, Refused
+from hoz_dist.wire.protocol.answers import Accepted, Busy, PushReply, Refused
 
 
 def test_of_several_answers_the_one_of_the_highest_epoch_counts() -> None:

@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from hoz_dist.wire.protocol.answers import Refused
 from hoz_dist.wire.protocol.codec import MESSAGES, decode, encode
 from hoz_dist.wire.protocol.message import Message
-from hoz_dist.wire.protocol.messages import Refused
 from hoz_dist.wire.protocol.rejection import Reason, RejectedError
 from tests import wire_samples as samples
 from tests.mutations import MUTATIONS, Mutation, encoded, mutated

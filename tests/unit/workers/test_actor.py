@@ -11,8 +11,8 @@ import torch
 from hoz_dist.a3c.loss import Loss
 from hoz_dist.config import RunConfig
 from hoz_dist.nav.episode import EpisodeResult
+from hoz_dist.wire.protocol.answers import Accepted, Refused
 from hoz_dist.wire.protocol.message import MAX_EPISODES
-from hoz_dist.wire.protocol.messages import Accepted, Refused
 from hoz_dist.wire.protocol.rejection import Reason
 from tests.wire_samples import EPISODE
 from workers import actor as module

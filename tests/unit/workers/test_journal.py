@@ -5,7 +5,8 @@ import pytest
 
 from hoz_dist.errors import InvalidValueError
 from hoz_dist.nav.categories import TARGETS
-from hoz_dist.wire.protocol.messages import Accepted, EpisodesPush, RoomGraphPush
+from hoz_dist.wire.protocol.answers import Accepted
+from hoz_dist.wire.protocol.pushes import EpisodesPush, RoomGraphPush
 from tests import wire_samples as samples
 from workers.journal import Journal
 
