@@ -17,7 +17,7 @@ from hoz_dist.nav.observation import Observation
 from hoz_dist.policy.graph_bank import GraphBank
 from hoz_dist.policy.layers import DoneReminder, ObjectLayer, SceneLayer, ZoneLayer
 from hoz_dist.policy.navigator import Guidance, ZoneState, guide, initial_zone_state
-from hoz_dist.policy.recurrent import EpisodicLSTM
+from hoz_dist.policy.recurrent import EpisodicLSTM, Tape
 from hoz_dist.policy.settings import PolicySettings
 from hoz_dist.policy.trunks import make_trunk
 
@@ -53,6 +53,8 @@ class Unrolled(NamedTuple):
     """[T, B]."""
     scene_logits: Tensor | None
     """[T, B, S], or None without the scene layer."""
+    state: State
+    """State after the rollout's last step."""
 
 
 class _Inputs(NamedTuple):
@@ -122,14 +124,19 @@ class ActorCritic(nn.Module):
         """Return the state before any episode's first step."""
         return State(self.lstm.initial_state(batch), initial_zone_state(batch, self.settings.zones))
 
+    def tape(self, steps: int, batch: int) -> Tape:
+        """Return an empty tape for T steps of B episodes."""
+        return self.lstm.tape(steps, batch)
+
     @torch.no_grad()
-    def act(self, observation: Observation, state: State, bank: GraphBank) -> Decision:
+    def act(self, observation: Observation, state: State, bank: GraphBank, tape: Tape | None = None) -> Decision:
         """Perceive one step of B episodes, and say how to go on.
 
         Args:
             observation: [B, ...].
             state: State after the step before; that of an episode which begins is reset here.
             bank: Scene graphs; not used without the zone layer.
+            tape: Where to record the step for `unroll`; None not to.
         """
         inputs = _Inputs.of(observation)
         first = torch.from_numpy(observation.first)
@@ -142,11 +149,14 @@ class ActorCritic(nn.Module):
             zone, guidance = guide(self.zone_layer, bank, zone, inputs.bag, inputs.target, scene_logits, scene, first)
             embedding = self.zone_layer(zone.nodes, bank.adjacency[guidance.scene, guidance.subgoal])
         joined = self._join(inputs, picture, scene_logits, embedding)
-        outputs, lstm = self.lstm(joined.unsqueeze(0), first.unsqueeze(0), state.lstm)
-        logits, value = self._heads(outputs.squeeze(0), inputs)
-        return Decision(logits, value, State(lstm, zone), guidance)
+        tape = tape or self.tape(1, len(first))
+        outputs = self.lstm.step(joined, first, state.lstm, tape)
+        logits, value = self._heads(outputs, inputs)
+        return Decision(logits, value, State(tape.state, zone), guidance)
 
-    def unroll(self, observation: Observation, state: State, guidance: Guidance, bank: GraphBank) -> Unrolled:
+    def unroll(
+        self, observation: Observation, state: State, guidance: Guidance, bank: GraphBank, tape: Tape | None = None
+    ) -> Unrolled:
         """Run over a rollout, differentiably.
 
         Args:
@@ -154,25 +164,33 @@ class ActorCritic(nn.Module):
             state: State before the rollout's first step.
             guidance: What `act` decided at each step, [T, B].
             bank: The scene graphs that `act` used.
+            tape: What `act` recorded of the rollout with the parameters as they are now, which is then not computed
+                again; or an empty one to record it on. It must stay as it is until the gradient is computed.
         """
         steps, batch = observation.target.shape
         inputs = _Inputs.of(observation)
         first = torch.from_numpy(observation.first)
         picture = self.trunk.see(inputs.features)
         scene_logits = self._scene_logits(picture, inputs)
-        embedding = None
+        zone, embedding = state.zone, None
         if self.zone_layer is not None:
             bags = inputs.bag.view(steps, batch, -1)
             nodes = self._nodes_over_time(self.zone_layer, bags, state.zone, guidance, bank)
             rows = bank.adjacency[guidance.scene.flatten(), guidance.subgoal.flatten()]
             embedding = self.zone_layer(nodes.flatten(0, 1), rows)
+            zone = zone._replace(nodes=nodes[-1].detach(), scene=guidance.scene[-1])
         joined = self._join(inputs, picture, scene_logits, embedding)
-        outputs, _ = self.lstm(joined.view(steps, batch, -1), first, state.lstm)
+        joined = joined.view(steps, batch, -1)
+        tape = self.tape(steps, batch) if tape is None else tape
+        if tape.is_empty:
+            self.lstm.record(joined, first, state.lstm, tape)
+        outputs = self.lstm.differentiable(joined, tape)
         logits, values = self._heads(outputs.flatten(0, 1), inputs)
         return Unrolled(
             logits=logits.view(steps, batch, -1),
             values=values.view(steps, batch),
             scene_logits=None if scene_logits is None else scene_logits.view(steps, batch, -1),
+            state=State(tape.state, zone),
         )
 
     def _scene_logits(self, picture: Tensor, inputs: _Inputs) -> Tensor | None:
