@@ -48,7 +48,9 @@ class ObjectLayer(nn.Module):
             H_o' f^v, [B, D_o, C + 1].
         """
         nodes = torch.cat([detections, target.unsqueeze(-1)], dim=-1)
-        embedding = functional.relu(self.adjacency @ (nodes @ self.weight))  # [B, N, D_o]
+        # A X_o first: it has 6 columns, W_o's product has D_o; and as X_o' A', one product for the whole batch.
+        mixed = (nodes.transpose(1, 2) @ self.adjacency.t()).transpose(1, 2)
+        embedding = functional.relu(mixed @ self.weight)  # [B, N, D_o]
         values = torch.cat([appearance, detections[..., 4:5]], dim=-1)  # [B, N, C + 1]
         return embedding.transpose(1, 2) @ values
 

@@ -80,10 +80,14 @@ class GridTrunk(nn.Module):
 
     def forward(self, picture: Tensor, objects: Tensor | None, context: Tensor) -> Tensor:
         """Join the inputs; see `VectorTrunk.forward`."""
-        parts = [picture, context.unsqueeze(1).expand(-1, self.cells, -1)]
+        # The pointwise convolution of all maps on top of each other, but part by part: the context is the same in
+        # every cell, so its share is computed once, and nothing is copied together.
+        widths = [picture.shape[2], context.shape[1]] + ([picture.shape[2]] if objects is not None else [])
+        weights = self.join.weight.split(widths, dim=1)
+        joined = picture @ weights[0].t() + functional.linear(context, weights[1], self.join.bias).unsqueeze(1)
         if objects is not None:
-            parts.append(functional.relu(self.objects(objects)))
-        return functional.relu(self.join(torch.cat(parts, dim=2))).flatten(1)
+            joined = joined + functional.relu(self.objects(objects)) @ weights[2].t()
+        return functional.relu(joined).flatten(1)
 
 
 def make_trunk(settings: PolicySettings, context: int) -> VectorTrunk | GridTrunk:

@@ -50,6 +50,28 @@ def test_unrolling_says_what_acting_said(without: tuple[Layer, ...], preset: Pre
     torch.testing.assert_close(unrolled.logits, torch.stack([d.logits for d in decisions]), atol=1e-5, rtol=1e-4)
     torch.testing.assert_close(unrolled.values, torch.stack([d.value for d in decisions]), atol=1e-5, rtol=1e-4)
     assert (unrolled.scene_logits is not None) == ("scene" not in without)
+    after = decisions[-1].state
+    torch.testing.assert_close(unrolled.state.lstm, after.lstm, atol=1e-5, rtol=1e-4)
+    torch.testing.assert_close(unrolled.state.zone.nodes, after.zone.nodes)
+    assert torch.equal(unrolled.state.zone.scene, after.zone.scene)
+
+
+def test_the_tape_of_acting_gives_the_same_gradient_as_computing_it_again(bank: GraphBank) -> None:
+    policy = make_policy(CONFIG.policy, 0)
+    flat = FlatParameters(policy)
+    observation, start = make_observation(STEPS, BATCH), policy.initial_state(BATCH)
+    tape, state, decisions = policy.tape(STEPS, BATCH), start, []
+    for t in range(STEPS):
+        decisions.append(policy.act(step_of(observation, t), state, bank, tape))
+        state = decisions[-1].state
+    guidance = Guidance(*map(torch.stack, zip(*(decision.guidance for decision in decisions), strict=True)))
+    gradients = []
+    for recorded in (tape, None):
+        flat.gradients.zero_()
+        unrolled = policy.unroll(observation, start, guidance, bank, recorded)
+        (unrolled.logits.square().sum() + unrolled.values.sum()).backward()  # type: ignore[no-untyped-call]
+        gradients.append(flat.gradients.clone())
+    torch.testing.assert_close(gradients[0], gradients[1], atol=1e-5, rtol=1e-4)
 
 
 def test_the_state_before_a_rollout_matters(bank: GraphBank) -> None:
