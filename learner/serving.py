@@ -16,6 +16,7 @@ from hoz_dist.graph.room_graph import RoomGraph
 from hoz_dist.graph.scene_graph import SceneGraph
 from hoz_dist.nav.categories import TARGETS
 from hoz_dist.outage import Outage
+from hoz_dist.stages import StageClock
 from hoz_dist.wire.membership.liveliness import Member, Members
 from hoz_dist.wire.protocol.answers import Refused
 from hoz_dist.wire.protocol.keys import Keys
@@ -100,6 +101,7 @@ class Learner:
         self._status = core.status(time.monotonic())
         self._rejections = Rejections()
         self._inbox = Inbox()
+        self._clock = StageClock()
         self._done_since: float | None = None
         self._updates_disk = Outage(_log, "cannot record updates (%s); training on", "updates are recorded again")
         self._scalars_disk = Outage(_log, "cannot log to TensorBoard (%s); training on", "logging to TensorBoard again")
@@ -112,7 +114,9 @@ class Learner:
             self._scalars = ScalarRecorder(run.folder.tensorboard, core.statistics.frames)
             stack.callback(self._scalars.close)
             stack.callback(self._save_last)
-            self._parameters = stack.enter_context(ParametersPublisher(session, keys, self._rejections, memory=memory))
+            self._parameters = stack.enter_context(
+                ParametersPublisher(session, keys, self._rejections, memory=memory, clock=self._clock)
+            )
             config = ConfigReply(self._name, core.epoch, TARGETS, core.config.to_json())
             snapshots = Snapshots(config, self.status, core.config.edge_cost)
             self._publish_parameters()
@@ -127,6 +131,7 @@ class Learner:
                     graphs=graphs,
                     inbox=self._inbox,
                     parameters=core.parameters.size,
+                    clock=self._clock,
                 )
             )
             self._open = stack.pop_all()
@@ -146,7 +151,8 @@ class Learner:
         """Work until ``stop`` is set or another learner leads; or, if wanted, until the run is over and known to be."""
         renew_at = record_at = time.monotonic()
         while not stop.is_set() and not (exit_when_done and self._may_leave()):
-            request = self._inbox.take(TICK_S)
+            with self._clock("idle"):
+                request = self._inbox.take(TICK_S)
             now = time.monotonic()
             # After the wait, and before the push is handled: this process may have stood still in between.
             if not self._leads(now):
@@ -155,13 +161,14 @@ class Learner:
                 self._carry_out(self._core.handle(Tick(), now), None, now)
             else:
                 self._handle(request, now)
-            self._checkpoints.poll(now)
-            if now >= renew_at:
-                self._status = self._core.status(now)
-                renew_at = now + STATUS_S
-            if now >= record_at:
-                self._record(now)
-                record_at = now + RECORD_S
+            with self._clock("record"):
+                self._checkpoints.poll(now)
+                if now >= renew_at:
+                    self._status = self._core.status(now)
+                    renew_at = now + STATUS_S
+                if now >= record_at:
+                    self._record(now)
+                    record_at = now + RECORD_S
 
     def status(self) -> StatusReply:
         """Return the status that is served; called by the server's threads."""
@@ -173,12 +180,19 @@ class Learner:
             processes=live_processes(self._members, actors, rejected),
             left=left_processes(self._members),
             rejected=self._rejections.by_reason(),
-            details={"run": self._name, "leader": self._leader, "busy": self._inbox.put_off, **status},
+            details={
+                "run": self._name,
+                "leader": self._leader,
+                "busy": self._inbox.put_off,
+                "timings": self._clock.to_json(),
+                **status,
+            },
         )
 
     def _handle(self, request: Request, now: float) -> None:
         try:
-            effects = self._core.handle(_event_of(request), now)
+            with self._clock("apply"):
+                effects = self._core.handle(_event_of(request), now)
         except Exception:  # noqa: BLE001 - logged in full
             # Whatever a push manages to provoke must not stop the training, here and after each restart.
             _log.exception("failed to handle a push of %s", request.message.actor)
@@ -200,15 +214,18 @@ class Learner:
                     self._server.put_graph(self._core.graphs.rooms[str(room)])
                     self._server.put_graph(self._core.graphs.scenes[room.scene])
                 case RecordUpdate(record):
-                    self._updates.write(record)
+                    with self._clock("record"):
+                        self._updates.write(record)
                 case SaveCheckpoint(keep):
-                    self._checkpoints.save(now, keep=keep)
+                    with self._clock("record"):
+                        self._checkpoints.save(now, keep=keep)
                 case Finish():
                     _log.info("the run is over at version %d; its last checkpoint will be kept", self._core.version)
                     self._done_since = now
 
     def _publish_parameters(self) -> None:
-        self._parameters.publish(self._core.epoch, self._core.version, self._core.parameters)
+        with self._clock("publish"):
+            self._parameters.publish(self._core.epoch, self._core.version, self._core.parameters)
 
     def _snapshot(self, now: float) -> Checkpoint:
         # The record must have every update that a checkpoint has: the next learner's begins with the version after. It

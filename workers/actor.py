@@ -22,6 +22,7 @@ from hoz_dist.nav.rooms import RoomId
 from hoz_dist.sim.batch_env import BatchEnv
 from hoz_dist.sim.view_source import ViewSource
 from hoz_dist.sim.view_store import ViewStore
+from hoz_dist.stages import StageClock
 from hoz_dist.waiting import StoppedError
 from hoz_dist.wire.protocol.answers import Accepted, Refused
 from hoz_dist.wire.protocol.graph_messages import SceneGraphReply
@@ -31,6 +32,7 @@ from hoz_dist.wire.protocol.rejection import Reason
 from workers.collector import Collector
 from workers.link import LearnerLink
 from workers.preparation import RoomPreparation
+from workers.timings import Timings
 
 _log = logging.getLogger(__name__)
 UPDATES_PER_ROOM: Final = 2
@@ -80,6 +82,8 @@ class Actor:
         source: Where observations come from: stored views, or PyBullet at every step.
         name: Name of the actor; with the run's seed and the learner's epoch it seeds the episodes and actions.
         stop: Ends the work at the next step.
+        clock: Measures the stages of the work.
+        timings: Where they are noted.
     """
 
     def __init__(
@@ -91,15 +95,19 @@ class Actor:
         source: ViewSource,
         name: str,
         stop: threading.Event,
+        clock: StageClock | None = None,
+        timings: Timings | None = None,
     ) -> None:
         config = link.config
         # With the epoch, a run that is resumed goes on with other episodes than it began with.
         rng = np.random.default_rng([config.seed, zlib.crc32(name.encode()), link.epoch])
         self._link = link
         self._stop = stop
+        self._clock = clock or StageClock()
+        self._timings = timings
         self._preparation = RoomPreparation(rooms, store, encoder, zones=config.zones, actor=name)
         self._env = BatchEnv(config.batch, rng, source=source)
-        self._collector = Collector(config, self._env, rng)
+        self._collector = Collector(config, self._env, rng, self._clock)
         self._epoch = link.epoch
         self._newest: tuple[int, int] | None = None
         """Epoch and version that the next parameters must have reached."""
@@ -107,6 +115,8 @@ class Actor:
         self._scene_graphs: dict[str, SceneGraphReply] = {}
         """The messages whose graphs are in use, by scene."""
         self._report = _Report()
+        self._frames = 0
+        """Frames that the learner accepted."""
 
     def run(self) -> None:
         """Work until the run is over or `stop` is set.
@@ -123,6 +133,8 @@ class Actor:
                 self._refresh_graphs()
                 self._update()
                 updates += 1
+                if self._timings is not None:
+                    self._timings.update(self._frames, self._preparation.waiting)
                 if self._report.is_due:
                     self._send_report()
             _log.info("stopped")
@@ -132,10 +144,11 @@ class Actor:
             _log.info("the run is over")
 
     def _prepare_room(self) -> None:
-        room = self._preparation.next(self._check_stop)
-        self._push_room_graph(room.graph)
-        self._room_graphs.append(room.graph)
-        self._env.add_room(room.views)
+        with self._clock("rooms"):
+            room = self._preparation.next(self._check_stop)
+            self._push_room_graph(room.graph)
+            self._room_graphs.append(room.graph)
+            self._env.add_room(room.views)
         _log.info("%s is ready; %d rooms to go", room.views.room, self._preparation.waiting)
 
     def _check_stop(self, done: int, total: int) -> None:
@@ -164,22 +177,28 @@ class Actor:
 
     def _update(self) -> None:
         """Fetch parameters, roll out, push the gradient."""
-        parameters = self._link.parameters(self._newest)
+        with self._clock("parameters"):
+            parameters = self._link.parameters(self._newest)
         if parameters.head.epoch != self._epoch:
             # A restarted learner knows what its last checkpoint held; a room graph that it has already is no change.
             self._epoch = parameters.head.epoch
             self._link.check_same_run()
             for graph in self._room_graphs:
                 self._push_room_graph(graph)
-        self._collector.parameters.load(parameters.vector)
-        update = self._collector.roll_out()
+        with self._clock("load"):
+            self._collector.parameters.load(parameters.vector)
+        with self._clock("act"):
+            update = self._collector.roll_out()
         self._report.rollouts += 1
         self._report.episodes += update.finished
         if not np.isfinite(update.gradient).all():
             _log.warning("a gradient is not finite; it is dropped")
             return
-        match self._link.push_gradient(update.gradient, update.frames, parameters.head.stamp):
+        with self._clock("push"):
+            reply = self._link.push_gradient(update.gradient, update.frames, parameters.head.stamp)
+        match reply:
             case Accepted(epoch, version):
+                self._frames += update.frames
                 self._newest = (epoch, version)
                 self._report.updates += 1
                 self._report.losses.update(update.loss.terms())
@@ -194,6 +213,8 @@ class Actor:
 
     def _send_report(self) -> None:
         report, self._report = self._report, _Report()
-        match self._link.push_episodes(report.episodes, report.mean_losses):
+        with self._clock("report"):
+            reply = self._link.push_episodes(report.episodes, report.mean_losses)
+        match reply:
             case Refused(reason, detail) if reason != Reason.FINISHED:
                 _log.warning("a report of %d episodes was refused (%s): %s", len(report.episodes), reason, detail)

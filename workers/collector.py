@@ -21,6 +21,7 @@ from hoz_dist.policy.navigator import Guidance
 from hoz_dist.policy.parameters import FlatParameters, make_policy
 from hoz_dist.policy.sampling import sample_actions
 from hoz_dist.sim.batch_env import BatchEnv
+from hoz_dist.stages import StageClock
 
 
 class Update(NamedTuple):
@@ -40,15 +41,19 @@ class Collector:
         config: Configuration of the run.
         env: Environment of ``config.batch`` episodes, with at least one room before the first rollout.
         rng: Source of the actions.
+        clock: Measures how long the way back over a rollout takes.
 
     Attributes:
         parameters: The policy's parameters; load new ones between rollouts.
     """
 
-    def __init__(self, config: RunConfig, env: BatchEnv, rng: np.random.Generator) -> None:
+    def __init__(
+        self, config: RunConfig, env: BatchEnv, rng: np.random.Generator, clock: StageClock | None = None
+    ) -> None:
         self._config = config
         self._env = env
         self._rng = rng
+        self._clock = clock or StageClock()
         self._policy: ActorCritic = make_policy(config.policy, config.seed)
         self.parameters = FlatParameters(self._policy)
         self._bank = GraphBank(config.zones, config.edge_cost)
@@ -100,7 +105,8 @@ class Collector:
         )
         observation = Observation(*map(np.stack, zip(*observations, strict=True)))
         guidance = Guidance(*map(torch.stack, zip(*(decision.guidance for decision in decisions), strict=True)))
-        loss = self._differentiate(rollout, observation, guidance, start)
+        with self._clock("differentiate"):
+            loss = self._differentiate(rollout, observation, guidance, start)
         return Update(self.parameters.gradients.numpy(), rollout.frames, loss, finished)
 
     def _differentiate(self, rollout: Rollout, observation: Observation, guidance: Guidance, start: State) -> Loss:

@@ -3,33 +3,27 @@
 What the learner recorded must hold every line whose push a checkpoint covers, exactly once.
 """
 
-import json
 import time
-from contextlib import suppress
 from pathlib import Path
 
 from hoz_dist.closing import Closing
-from hoz_dist.errors import InvalidValueError
 from hoz_dist.wire.protocol.answers import Accepted
 from hoz_dist.wire.protocol.pushes import EpisodesPush, GradientPush, Push, RoomGraphPush
+from workers.json_lines import JsonLines
 
 
 class Journal(Closing):
-    """Appends JSON lines to a file, each flushed at once, so that a killed actor loses none.
+    """Notes pushes in a file.
 
     Args:
-        path: The file; made when it is not there.
+        path: The file; lines are appended.
 
     Raises:
         InvalidValueError: It cannot be written.
     """
 
     def __init__(self, path: Path) -> None:
-        self._path = path
-        try:
-            self._file = path.open("a", encoding="utf-8")
-        except OSError as error:
-            raise self._cannot_write(error) from error
+        self._lines = JsonLines(path, "journal")
 
     def write(self, push: Push, answer: Accepted, tries: int) -> None:
         """Note a push that was accepted.
@@ -53,20 +47,11 @@ class Journal(Closing):
             **_content(push),
             "tries": tries,
         }
-        try:
-            self._file.write(json.dumps(line) + "\n")
-            self._file.flush()
-        except OSError as error:
-            raise self._cannot_write(error) from error
+        self._lines.write(line)
 
     def close(self) -> None:
         """Close the file."""
-        with suppress(OSError):  # said already, when the line was written
-            self._file.close()
-
-    def _cannot_write(self, error: OSError) -> InvalidValueError:
-        message = f"Cannot write the journal '{self._path}' ({error.strerror}); choose another file with --journal."
-        return InvalidValueError(message)
+        self._lines.close()
 
 
 def _content(push: Push) -> dict[str, object]:

@@ -18,6 +18,7 @@ from hoz_dist.graph.room_graph import RoomGraph
 from hoz_dist.nav.categories import TARGETS
 from hoz_dist.nav.episode import EpisodeResult
 from hoz_dist.nav.rooms import RoomId
+from hoz_dist.stages import StageClock
 from hoz_dist.waiting import Deadline, StoppedError
 from hoz_dist.wire.client.discovery import find_run
 from hoz_dist.wire.client.epochs import Epochs
@@ -61,6 +62,7 @@ class LearnerLink(Closing):
         stop: Ends whatever waits, with `StoppedError`.
         journal: Where acknowledged pushes are noted.
         memory: Shared memory for large pushes.
+        clock: Measures how long answers take.
 
     Attributes:
         config: Configuration of the run.
@@ -80,6 +82,7 @@ class LearnerLink(Closing):
         stop: threading.Event,
         journal: Journal | None = None,
         memory: SharedMemory | None = None,
+        clock: StageClock | None = None,
     ) -> None:
         reply = find_run(session, run, JOIN_S, stop)
         if reply.categories != TARGETS:
@@ -97,7 +100,7 @@ class LearnerLink(Closing):
         self._incarnation = secrets.randbits(48)
         self._sequences: Counter[type[Push]] = Counter()
         noted = journal.write if journal is not None else None
-        self._pusher = Pusher(session, stop, epochs=self._epochs, acknowledged=noted, memory=memory)
+        self._pusher = Pusher(session, stop, epochs=self._epochs, acknowledged=noted, memory=memory, clock=clock)
         with ExitStack() as stack:
             stack.enter_context(
                 declare_alive(session, self._keys, Member("actor", actor, host_name(), self._incarnation))

@@ -42,6 +42,12 @@ CONNECT_S: Final = 5.0
     metavar="FILE",
     help="Append a JSON line for each push that the learner acknowledged.  [default: none]",
 )
+@click.option(
+    "--timings",
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="Append a JSON line after each update that says what each stage of the work has taken.  [default: none]",
+)
 @shared_memory_option
 @click.option("--live", is_flag=True, help="Render every step in PyBullet instead of looking it up; slow.")
 def actor_command(
@@ -53,6 +59,7 @@ def actor_command(
     weights: Path | None,
     cache: Path | None,
     journal: Path | None,
+    timings: Path | None,
     *,
     shared_memory: bool,
     live: bool,
@@ -65,6 +72,7 @@ def actor_command(
     from contextlib import ExitStack, suppress
 
     from hoz_dist.nav.rooms import training_rooms
+    from hoz_dist.stages import StageClock
     from hoz_dist.waiting import StoppedError
     from hoz_dist.wire.transport.session import open_client
     from hoz_dist.wire.transport.shared_memory import SharedMemory
@@ -89,18 +97,21 @@ def actor_command(
         from workers.actor import Actor
         from workers.journal import Journal
         from workers.link import LearnerLink
+        from workers.timings import Timings
 
         # A process is one thread: actors share the cores, and one thread adds up the same way every time.
         torch.set_num_threads(1)
+        clock = StageClock()
         with ExitStack() as stack:
             book = stack.enter_context(Journal(journal)) if journal is not None else None
-            link = stack.enter_context(LearnerLink(session, actor, run, stop, book, memory))
+            stages = stack.enter_context(Timings(timings, clock)) if timings is not None else None
+            link = stack.enter_context(LearnerLink(session, actor, run, stop, book, memory, clock))
             size = link.config.picture_size
             encoder = matching_encoder(link.config, weights)
             store = ViewStore(cache or default_cache(), size)
             source = stack.enter_context(LiveViews(encoder, size)) if live else StoredViews()
             logging.getLogger("hoz_dist").info("%s joins run %s with %d rooms", actor, link.run, len(rooms))
-            Actor(link, rooms, store, encoder, source, actor, stop).run()
+            Actor(link, rooms, store, encoder, source, actor, stop, clock, stages).run()
 
 
 def _default_name() -> str:

@@ -8,6 +8,7 @@ import threading
 from collections.abc import Callable
 
 from hoz_dist.errors import ConnectionFailedError
+from hoz_dist.stages import StageClock
 from hoz_dist.waiting import FIRST_TRY_S, Backoff, Deadline
 from hoz_dist.wire.client.asking import Asking
 from hoz_dist.wire.client.epochs import Epochs
@@ -29,6 +30,7 @@ class Pusher:
         epochs: What is known of the learner's epochs; what a learner of a lower one answers counts as no answer.
         acknowledged: Told of each push that was accepted: the push, the answer, and how often it was sent.
         memory: Shared memory for large messages; None for none.
+        clock: Measures how long answers take, as the stage ``answer``.
     """
 
     def __init__(
@@ -39,12 +41,14 @@ class Pusher:
         epochs: Epochs | None = None,
         acknowledged: Callable[[Push, Accepted, int], None] | None = None,
         memory: SharedMemory | None = None,
+        clock: StageClock | None = None,
     ) -> None:
         self._stop = stop
         self._epochs = epochs or Epochs()
         self._asking = Asking(session, stop, self._epochs, attempt_s)
         self._acknowledged = acknowledged
         self._memory = memory or SharedMemory(on=False)
+        self._clock = clock or StageClock()
 
     def push(self, key: str, message: Push, deadline_s: float | None = None) -> Accepted | Refused:
         """Send a message until it is acknowledged.
@@ -72,7 +76,10 @@ class Pusher:
         while True:
             tries += 1
             wrapped = self._memory.wrap(payload)  # anew for each try: a paused receiver's may have been written over
-            reply = self._asking.once(key, deadline, Accepted, Busy, Refused, payload=wrapped, attachment=attachment)
+            with self._clock("answer"):
+                reply = self._asking.once(
+                    key, deadline, Accepted, Busy, Refused, payload=wrapped, attachment=attachment
+                )
             match reply:
                 case Accepted():
                     if self._acknowledged is not None:

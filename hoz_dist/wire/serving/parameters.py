@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from zenoh import KeyExpr, Query, Session
 
 from hoz_dist.closing import Closing
+from hoz_dist.stages import StageClock
 from hoz_dist.wire.protocol.answers import Busy
 from hoz_dist.wire.protocol.keys import NAME_PATTERN, Keys
 from hoz_dist.wire.protocol.message import SHARD_ELEMENTS, Message
@@ -37,6 +38,7 @@ class ParametersPublisher(Closing):
         rejections: Where questions that cannot be understood are counted.
         versions: What is kept for readers.
         memory: Shared memory for the shards; None for none.
+        clock: Measures how long answering takes, as the stage ``serve``.
     """
 
     def __init__(
@@ -46,13 +48,15 @@ class ParametersPublisher(Closing):
         rejections: Rejections | None = None,
         versions: Versions | None = None,
         memory: SharedMemory | None = None,
+        clock: StageClock | None = None,
     ) -> None:
         self._keys = keys
+        self._clock = clock or StageClock()
         self._memory = memory
         self._rejections = rejections or Rejections()
         self._versions = versions or Versions()
         self._publisher = NewestPublisher(session, keys.params)
-        self._queryable = declare_queryable(session, keys.all_params, self._answer, rejections=self._rejections)
+        self._queryable = declare_queryable(session, keys.all_params, self._measured, rejections=self._rejections)
 
     def publish(self, epoch: int, version: int, vector: NDArray[np.float32]) -> ParametersHead:
         """Make a version the newest one.
@@ -73,6 +77,10 @@ class ParametersPublisher(Closing):
         """Stop publishing and serving."""
         self._queryable.close()
         self._publisher.close()
+
+    def _measured(self, query: Query) -> None:
+        with self._clock("serve"):
+            self._answer(query)
 
     def _answer(self, query: Query) -> None:
         """Reply with the head or with one shard."""

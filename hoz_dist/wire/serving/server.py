@@ -14,6 +14,7 @@ from hoz_dist.closing import Closing
 from hoz_dist.errors import HozError
 from hoz_dist.graph.room_graph import RoomGraph
 from hoz_dist.graph.scene_graph import SceneGraph
+from hoz_dist.stages import StageClock
 from hoz_dist.wire.protocol.answers import Refused
 from hoz_dist.wire.protocol.codec import checksum, decode, encode
 from hoz_dist.wire.protocol.graphs import room_graph_reply, scene_graph_reply
@@ -46,6 +47,7 @@ class Server(Closing):
         inbox: Where pushes are to wait.
         parameters: Number of parameters of the policy, P: a gradient that is longer is not even copied; None if any
             length will do.
+        clock: Measures how long receiving pushes takes, as the stage ``receive``.
 
     Attributes:
         session: The session.
@@ -64,11 +66,13 @@ class Server(Closing):
         graphs: Iterable[SceneGraph | RoomGraph] = (),
         inbox: Inbox | None = None,
         parameters: int | None = None,
+        clock: StageClock | None = None,
     ) -> None:
         self.inbox = inbox if inbox is not None else Inbox()  # an empty one is false
         self.rejections = rejections or Rejections()
         self.snapshots = snapshots
         self.session = session
+        self._clock = clock or StageClock()
         self._keys = keys
         self._epoch = snapshots.config.epoch
         self._most_bytes_of: dict[type[Push], int] = {}
@@ -115,7 +119,8 @@ class Server(Closing):
         """Check a push, and let it wait for the learner."""
         key = str(query.key_expr)
         try:
-            message, size = self._checked(query, key, expected)
+            with self._clock("receive"):
+                message, size = self._checked(query, key, expected)
         except RejectedError as error:
             self.rejections.count(error.reason, error.detail, sender_of(key))
             answer(query, key, Refused.of(error, self._epoch))
