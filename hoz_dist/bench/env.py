@@ -1,0 +1,120 @@
+"""`hoz-dist bench env`: steps of stored environments, and the opening of rooms."""
+
+import statistics
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from hoz_dist.bench.report import Metric
+from hoz_dist.bench.timing import Contender, Progress, rate, run_contests
+from hoz_dist.nav.actions import Action
+from hoz_dist.sim.batch_env import BatchEnv
+from hoz_dist.sim.room_views import RoomViews
+
+TRAINING_BATCH: Final = 64
+"""The default batch of a run; measured besides the one that is asked for."""
+MEAN_ACTIONS: Final = 30
+"""Mean length of an episode: one action of so many is Done, the others are drawn alike."""
+_STEPS: Final = 256
+"""Steps whose actions are drawn beforehand."""
+
+
+def bench_env(
+    rooms: Sequence[RoomViews],
+    openers: Sequence[Callable[[], RoomViews]],
+    *,
+    batch: int,
+    seconds: float,
+    repeats: int,
+    progress: Progress,
+) -> dict[str, Metric]:
+    """Measure steps per second in one thread, and how long a room takes to open.
+
+    A step includes what the agent perceives: features, boxes and appearance of all categories, and the bag, copied
+    out. The limit is a plain copy of as many bytes out of a table of the same size.
+
+    Args:
+        rooms: Rooms to step in.
+        openers: Each opens a room that is in the view cache. The limit is reading the bytes of its arrays.
+        batch: Episodes at once.
+        seconds: Length of one measurement.
+        repeats: Measurements of each figure.
+        progress: Told how far the work is.
+    """
+    sizes = dict.fromkeys((batch, TRAINING_BATCH))
+    contests = [partial(_stepping, rooms, size, seconds) for size in sizes]
+    samples = run_contests([*contests, partial(_opening, openers)], repeats, progress)
+    steps = {
+        "env_steps_per_second" if size == batch else f"env_steps_per_second_b{size}": Metric.of(
+            samples[f"steps, batch {size}"], "steps/s", samples[f"plain copy, batch {size}"]
+        )
+        for size in sizes
+    }
+    return steps | {"room_open_ms": Metric.of(samples["open"], "ms", samples["read"])}
+
+
+@contextmanager
+def _stepping(rooms: Sequence[RoomViews], batch: int, seconds: float) -> Iterator[Mapping[str, Contender]]:
+    rng = np.random.default_rng(0)
+    env = BatchEnv(batch, rng)
+    for views in rooms:
+        env.add_room(views)
+    shares = np.full(len(Action), (1.0 - 1.0 / MEAN_ACTIONS) / (len(Action) - 1))
+    shares[Action.DONE] = 1.0 / MEAN_ACTIONS
+    actions = rng.choice(len(Action), size=(_STEPS, batch), p=shares)
+
+    def step() -> None:
+        for chosen in actions:
+            observation = env.observe()
+            bag = observation.detections[..., 4] > 0
+            assert len(bag) == batch  # noqa: S101 - it is made for its cost
+            env.step(chosen)
+
+    observation = env.observe()
+    perceived = (observation.features, observation.detections, observation.appearance)
+    values = sum(part.size for part in perceived) // batch
+    table = np.zeros((sum(views.graph.views for views in rooms), values), dtype=np.float32)
+    table += 1.0  # its pages are really there
+    copied = np.zeros((batch, values), dtype=np.float32)
+    starts = rng.integers(max(len(table) - batch, 1), size=_STEPS).tolist()
+
+    def copy() -> None:
+        for start in starts:
+            block = table[start : start + batch]
+            copied[: len(block)] = block
+
+    yield {
+        f"steps, batch {batch}": lambda: rate(step, seconds) * _STEPS * batch,
+        f"plain copy, batch {batch}": lambda: rate(copy, seconds) * _STEPS * batch,
+    }
+
+
+@contextmanager
+def _opening(openers: Sequence[Callable[[], RoomViews]]) -> Iterator[Mapping[str, Contender]]:
+    files = [_files(opener()) for opener in openers]
+
+    def read(paths: Sequence[Path]) -> None:
+        for path in paths:
+            path.read_bytes()
+
+    yield {
+        "open": lambda: statistics.median(_milliseconds(opener) for opener in openers),
+        "read": lambda: statistics.median(_milliseconds(partial(read, paths)) for paths in files),
+    }
+
+
+def _files(views: RoomViews) -> list[Path]:
+    """Return the files that hold the arrays of a room, as far as it is stored."""
+    arrays = (views.features, views.detections, views.appearance, views.success, views.optimal)
+    return [Path(str(array.filename)) for array in arrays if isinstance(array, np.memmap)]
+
+
+def _milliseconds(work: Callable[[], object]) -> float:
+    start = time.perf_counter()
+    work()
+    return 1000 * (time.perf_counter() - start)
