@@ -10,7 +10,7 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from collections.abc import Set as AbstractSet
-from typing import Annotated, Any, ClassVar, Final, Protocol, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, ClassVar, Final, NamedTuple, Protocol, get_args, get_origin, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,8 +22,23 @@ MOST_ELEMENTS: Final = 4096
 """Longest list or map anywhere in a message; a field's own limit is at most this."""
 MOST_CHARACTERS: Final = 4096
 """Longest text anywhere in a message; a field's own limit is at most this."""
-DTYPES: Final[Mapping[str, np.dtype[Any]]] = {"float32": np.dtype("<f4"), "float64": np.dtype("<f8")}
-"""Element types by their name on the wire; always little-endian."""
+DTYPES: Final[Mapping[str, np.dtype[Any]]] = {
+    "float32": np.dtype("<f4"),
+    "float64": np.dtype("<f8"),
+    "bfloat16": np.dtype("<u2"),
+    "int8": np.dtype("i1"),
+    "uint8": np.dtype("u1"),
+    "uint16": np.dtype("<u2"),
+    "uint32": np.dtype("<u4"),
+}
+"""Element types by their name on the wire, and what holds them here; always little-endian.
+
+NumPy has no bfloat16: an array of them holds their bits, the upper half of those of the float32.
+"""
+_BFLOAT16_EXPONENT: Final = np.uint16(0x7F80)
+"""The bits of a bfloat16's exponent; all of them set say NaN or infinity."""
+_BLOCK: Final = 32 * 1024
+"""Elements that are looked at in one go where a pass needs memory of its own: they stay in the cache."""
 
 
 class Spec(Protocol):
@@ -149,6 +164,8 @@ class Tensor:
         most: Largest number of elements.
         low: Smallest element allowed.
         high: Largest element allowed.
+        bulk: Whether the elements stand behind the message's map instead of in it; see `hoz_dist.wire.protocol.bulk`.
+            For `bfloat16` there are neither bounds.
     """
 
     dtype: str
@@ -156,30 +173,47 @@ class Tensor:
     most: int
     low: float = -math.inf
     high: float = math.inf
+    bulk: bool = False
 
-    FIELDS: ClassVar[frozenset[str]] = frozenset({"dtype", "shape", "data"})
+    DESCRIPTION: ClassVar[frozenset[str]] = frozenset({"dtype", "shape"})
+    FIELDS: ClassVar[frozenset[str]] = DESCRIPTION | {"data"}
 
     def pack(self, value: NDArray[Any]) -> object:
-        """Return the map of dtype, shape and raw bytes; the bytes are a view, so that msgpack makes the only copy."""
+        """Return the map of dtype, shape and raw bytes, the bytes as a view, so that msgpack makes the only copy.
+
+        Of a bulk tensor these are `Bulky`: who lays the message out puts the bytes elsewhere.
+        """
         array = np.ascontiguousarray(value, DTYPES[self.dtype])
-        return {"dtype": self.dtype, "shape": list(array.shape), "data": array.reshape(-1).data.cast("B")}
+        data = array.reshape(-1).data.cast("B")
+        description = {"dtype": self.dtype, "shape": list(array.shape)}
+        return Bulky(description, data) if self.bulk else description | {"data": data}
 
     def unpack(self, raw: object, where: str) -> object:
         """Return a read-only array on the received bytes."""
-        fields = _map_of(raw, self.FIELDS, where)
-        shape, data = fields["shape"], fields["data"]
-        if fields["dtype"] != self.dtype:
-            raise RejectedError(Reason.DTYPE, f"{where} is {shown(fields['dtype'])}, not {self.dtype}")
+        fields = map_of(raw, self.FIELDS, where)
+        data = fields["data"]
+        size = self.bytes_of(fields, where)
+        if not isinstance(data, bytes | memoryview):
+            raise RejectedError(Reason.TYPE, f"{where}.data is not bytes but {type(data).__name__}")
+        if len(data) != size:
+            raise RejectedError(Reason.SHAPE, f"{where} has {len(data)} bytes for the shape {fields['shape']}")
+        return np.frombuffer(data, DTYPES[self.dtype]).reshape(fields["shape"])
+
+    def bytes_of(self, description: Mapping[str, Any], where: str) -> int:
+        """Return how many bytes the elements of a tensor take that is described so.
+
+        Raises:
+            RejectedError: It is not described as a tensor of this spec.
+        """
+        shape = description["shape"]
+        if description["dtype"] != self.dtype:
+            raise RejectedError(Reason.DTYPE, f"{where} is {shown(description['dtype'])}, not {self.dtype}")
         if type(shape) is not list or len(shape) != self.rank:
             raise RejectedError(Reason.SHAPE, f"{where} has no shape of {self.rank} axes")
         if not all(type(side) is int and 0 < side <= self.most for side in shape):
             # A side of 0 would excuse any other, also one that NumPy cannot hold.
             raise RejectedError(Reason.SHAPE, f"{where} has a side that is not in 1..{self.most}")
-        if type(data) is not bytes:
-            raise RejectedError(Reason.TYPE, f"{where}.data is not bytes but {type(data).__name__}")
-        if len(data) != math.prod(shape) * DTYPES[self.dtype].itemsize:
-            raise RejectedError(Reason.SHAPE, f"{where} has {len(data)} bytes for the shape {shape}")
-        return np.frombuffer(data, DTYPES[self.dtype]).reshape(shape)
+        return math.prod(shape) * DTYPES[self.dtype].itemsize
 
     def check(self, value: Any, where: str) -> None:
         """Judge a value; see `Spec.check`."""
@@ -191,10 +225,19 @@ class Tensor:
             raise RejectedError(Reason.SHAPE, f"{where} has the shape {value.shape}, not {self.rank} filled axes")
         if value.size > self.most:
             raise RejectedError(Reason.SIZE, f"{where} has {value.size} elements, more than {self.most}")
-        if not _all_finite(value):
+        if not (_all_finite_halves(value) if self.dtype == "bfloat16" else _all_finite(value)):
             raise RejectedError(Reason.NONFINITE, f"{where} holds NaN or infinity")
         if (self.low > -math.inf and value.min() < self.low) or (self.high < math.inf and value.max() > self.high):
             raise RejectedError(Reason.RANGE, f"{where} has an element that is not in {self.low}..{self.high}")
+
+
+class Bulky(NamedTuple):
+    """A packed bulk tensor."""
+
+    description: dict[str, object]
+    """What stands in the map: dtype and shape."""
+    data: memoryview
+    """What stands behind it: the raw bytes."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -327,11 +370,11 @@ class Structure:
         Raises:
             RejectedError: Anything is not as it should be.
         """
-        fields = _map_of(raw, cls.SPECS.keys(), where)
+        fields = map_of(raw, cls.SPECS.keys(), where)
         return cls(**{name: spec.unpack(fields[name], name) for name, spec in cls.SPECS.items()})
 
 
-def _map_of(raw: object, names: AbstractSet[str], where: str) -> dict[str, Any]:
+def map_of(raw: object, names: AbstractSet[str], where: str) -> dict[str, Any]:
     """Return a map that has exactly those names."""
     if type(raw) is not dict:
         raise _wrong_type(where, "a map", raw)
@@ -345,9 +388,18 @@ def _map_of(raw: object, names: AbstractSet[str], where: str) -> dict[str, Any]:
 
 def _all_finite(array: NDArray[Any]) -> bool:
     """Return whether every element is finite; the sum of squares says so in one pass, unless it overflows."""
+    if array.dtype.kind != "f":
+        return True
     flat = array.reshape(-1)
     with np.errstate(over="ignore", invalid="ignore"):
         return bool(np.isfinite(np.dot(flat, flat))) or bool(np.isfinite(flat).all())
+
+
+def _all_finite_halves(bits: NDArray[np.uint16]) -> bool:
+    """Return whether every bfloat16 is finite."""
+    flat = bits.reshape(-1)
+    blocks = (flat[start : start + _BLOCK] for start in range(0, flat.size, _BLOCK))
+    return all((block & _BFLOAT16_EXPONENT).max() < _BFLOAT16_EXPONENT for block in blocks)
 
 
 def _wrong_type(where: str, wanted: str, value: object) -> RejectedError:
