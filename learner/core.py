@@ -61,6 +61,7 @@ class LearnerCore:
         room_digests: Digests of rooms that are known beforehand, by room name.
         schedule: Recorded updates to repeat.
         checkpoint_seconds: Time between checkpoints.
+        keep_every: Frames between checkpoints that are never deleted; None for none but the last.
 
     Raises:
         InvalidValueError: The checkpoint's parameters do not fit the configuration's policy.
@@ -76,6 +77,7 @@ class LearnerCore:
         room_digests: Mapping[str, str] | None = None,
         schedule: Schedule | None = None,
         checkpoint_seconds: float = 30.0,
+        keep_every: int | None = None,
     ) -> None:
         self.config = config
         self.epoch = epoch
@@ -87,11 +89,13 @@ class LearnerCore:
         self._seen = SeenPushes()
         self._schedule = schedule
         self._checkpoint_seconds = checkpoint_seconds
+        self._keep_every = keep_every
         self._checkpoint_due: float | None = None
         """When to save; None while nothing changed."""
         self._clock = TrainingClock()
         if checkpoint is not None:
             self._resume(checkpoint, room_digests or {})
+        self._kept = self._milestone
 
     # --- what the shell reads ---
 
@@ -303,10 +307,19 @@ class LearnerCore:
             self._clock.stop(now)
             self._checkpoint_due = None
             return SaveCheckpoint(keep=True), Finish()
+        if self._milestone > self._kept:
+            self._kept = self._milestone
+            self._checkpoint_due = None
+            return (SaveCheckpoint(keep=True),)
         if self._checkpoint_due is not None and now >= self._checkpoint_due:
             self._checkpoint_due = None
             return (SaveCheckpoint(keep=False),)
         return ()
+
+    @property
+    def _milestone(self) -> int:
+        """Number of checkpoints to keep that the frames so far make up."""
+        return self.statistics.frames // self._keep_every if self._keep_every else 0
 
     def _save_within(self, seconds: float, now: float) -> None:
         due = now + seconds

@@ -65,6 +65,8 @@ class LearnerSettings:
     shared_memory: bool = False
     """Hand over large messages to processes of this host through shared memory."""
     checkpoint_seconds: float = 30.0
+    keep_every: int | None = None
+    """Frames between checkpoints that are never deleted; None for none but the last."""
     replay: Path | None = None
     """Recorded updates to repeat."""
     exit_when_done: bool = False
@@ -118,6 +120,7 @@ class _Cores:
             room_digests=self._room_digests,
             schedule=Schedule(self._records, applied) if self._records is not None else None,
             checkpoint_seconds=self._settings.checkpoint_seconds,
+            keep_every=self._settings.keep_every,
         )
 
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from hoz_dist.cli.connecting import keys_option, shared_memory_option
+from hoz_dist.cli.options import keep_every_option
 from hoz_dist.cli.run_options import run_config, run_options
 from hoz_dist.cli.stopping import stop_on_signals
 from hoz_dist.errors import InvalidValueError
@@ -53,6 +54,7 @@ if TYPE_CHECKING:
     show_default=True,
     help="Time between checkpoints, seconds; what a killed learner loses at most.",
 )
+@keep_every_option
 @click.option(
     "--replay",
     type=click.Path(path_type=Path),
@@ -69,6 +71,7 @@ def learner_command(
     keys: Path | None,
     run: Path,
     checkpoint_seconds: float,
+    keep_every: int | None,
     replay: Path | None,
     *,
     standby: bool,
@@ -111,6 +114,7 @@ def learner_command(
         config=config,
         shared_memory=shared_memory,
         checkpoint_seconds=checkpoint_seconds,
+        keep_every=keep_every,
         replay=replay,
         exit_when_done=exit_when_done,
     )

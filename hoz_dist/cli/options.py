@@ -28,6 +28,13 @@ weights_option = click.option(
     help="Weights of the resnet18 encoder, .safetensors or .pth.  [default: none needed]",
 )
 
+keep_every_option = click.option(
+    "--keep-every",
+    type=click.IntRange(min=1),
+    metavar="FRAMES",
+    help="Keep a checkpoint every so many frames for ever, for curves.  [default: the last of the run]",
+)
+
 json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON for scripts.")
 
 force_option = click.option("--force", is_flag=True, help="Replace the output file if it exists. Default: refuse.")

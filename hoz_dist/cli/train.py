@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from hoz_dist.cli.options import cache_option
+from hoz_dist.cli.options import cache_option, keep_every_option
 from hoz_dist.cli.run_options import as_arguments, run_config, run_options
 from hoz_dist.nav.categories import SCENES
 
@@ -40,6 +40,7 @@ from hoz_dist.nav.categories import SCENES
     show_default=True,
     help="Validation episodes in each scene afterwards; 0 for no evaluation.",
 )
+@keep_every_option
 @cache_option
 def train_command(
     run: Path,
@@ -48,6 +49,7 @@ def train_command(
     actors: int,
     scenes: tuple[str, ...],
     episodes: int,
+    keep_every: int | None,
     cache: Path | None,
     **choices: Any,
 ) -> None:
@@ -66,7 +68,9 @@ def train_command(
     files = {"weights": choices["weights"], "cache": cache}
     actor = as_arguments({"scene": scenes or SCENES, **files})
 
-    launch(run, f"tcp/127.0.0.1:{_free_port()}", as_arguments(choices), actor, actors)
+    learner = as_arguments(choices | {"keep_every": keep_every})
+
+    launch(run, f"tcp/127.0.0.1:{_free_port()}", learner, actor, actors)
 
     from hoz_dist.cli.report import report  # only now: it takes seconds to import
 

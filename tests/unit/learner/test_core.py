@@ -279,6 +279,21 @@ def test_a_checkpoint_is_asked_for_at_intervals_when_something_changed() -> None
     assert core.handle(Tick(), now=300.0) == []
 
 
+def test_checkpoints_are_kept_at_milestones_of_frames_also_after_a_restart() -> None:
+    core = new_core(keep_every=100)
+
+    def kept_after(core: LearnerCore, sequence: int) -> bool:
+        epoch = core.epoch
+        effects = core.handle(
+            GradientReceived(0, gradient(sequence, epoch=epoch, version=core.version, frames=40)), now=float(sequence)
+        )
+        return SaveCheckpoint(keep=True) in effects
+
+    assert [kept_after(core, sequence) for sequence in range(6)] == [False, False, True, False, True, False]
+    resumed = LearnerCore(CONFIG, vector(3), epoch=2, checkpoint=core.snapshot(now=6.0), keep_every=100)
+    assert [kept_after(resumed, sequence) for sequence in range(6, 9)] == [False, True, False]
+
+
 @pytest.mark.parametrize("budget", [{}, {"frames": 400}, {"minutes": 2.0}])
 def test_a_resumed_run_continues_as_if_never_interrupted(budget: dict[str, float]) -> None:
     config = replace(CONFIG, **budget)  # type: ignore[arg-type]
