@@ -3,12 +3,13 @@
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar
 
+from hoz_dist.wire.protocol.maps import Counts, JsonObject
 from hoz_dist.wire.protocol.message import (
     CATEGORIES,
     NAME,
     Message,
 )
-from hoz_dist.wire.protocol.schema import Counts, Int, JsonObject, Many, Real, Record, Structure, Text
+from hoz_dist.wire.protocol.schema import Int, Many, Real, Record, Structure, Text
 
 
 @dataclass(frozen=True, eq=False)

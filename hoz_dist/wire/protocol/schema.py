@@ -87,7 +87,7 @@ class Int(Scalar):
     def check(self, value: Any, where: str) -> None:
         """Judge a value; see `Spec.check`."""
         if type(value) is not int:  # bool is an int to Python, not on the wire
-            raise _wrong_type(where, "a whole number", value)
+            raise wrong_type(where, "a whole number", value)
         if not self.low <= value <= self.high:
             raise RejectedError(Reason.RANGE, f"{where} is {value}, not in {self.low}..{self.high}")
 
@@ -106,7 +106,7 @@ class Real(Scalar):
     def check(self, value: Any, where: str) -> None:
         """Judge a value; see `Spec.check`."""
         if type(value) is not float:
-            raise _wrong_type(where, "a number", value)
+            raise wrong_type(where, "a number", value)
         if not math.isfinite(value):
             raise RejectedError(Reason.NONFINITE, f"{where} is {value}")
         if not self.low <= value <= self.high:
@@ -120,7 +120,7 @@ class Bool(Scalar):
     def check(self, value: Any, where: str) -> None:
         """Judge a value; see `Spec.check`."""
         if type(value) is not bool:
-            raise _wrong_type(where, "true or false", value)
+            raise wrong_type(where, "true or false", value)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -133,7 +133,7 @@ class Text(Scalar):
     def check(self, value: Any, where: str) -> None:
         """Judge a value; see `Spec.check`."""
         if type(value) is not str:
-            raise _wrong_type(where, "a text", value)
+            raise wrong_type(where, "a text", value)
         if len(value) > self.longest:
             raise RejectedError(Reason.SIZE, f"{where} has {len(value)} characters, more than {self.longest}")
         if CONTROL.search(value) or (self.pattern is not None and not self.pattern.fullmatch(value)):
@@ -149,7 +149,7 @@ class OneOf(Scalar):
     def check(self, value: Any, where: str) -> None:
         """Judge a value; see `Spec.check`."""
         if not isinstance(value, str):  # a member of a StrEnum will do
-            raise _wrong_type(where, "a text", value)
+            raise wrong_type(where, "a text", value)
         if value not in self.names:
             raise RejectedError(Reason.NAME, f"{where} is unknown: {value[:80]!r}")
 
@@ -218,7 +218,7 @@ class Tensor:
     def check(self, value: Any, where: str) -> None:
         """Judge a value; see `Spec.check`."""
         if not isinstance(value, np.ndarray):
-            raise _wrong_type(where, "an array", value)
+            raise wrong_type(where, "an array", value)
         if value.dtype != DTYPES[self.dtype]:
             raise RejectedError(Reason.DTYPE, f"{where} is {value.dtype}, not {self.dtype}")
         if value.ndim != self.rank or value.size == 0:
@@ -254,7 +254,7 @@ class Many:
     def unpack(self, raw: object, where: str) -> object:
         """Return the tuple of the unpacked values."""
         if type(raw) is not list:
-            raise _wrong_type(where, "a list", raw)
+            raise wrong_type(where, "a list", raw)
         if len(raw) > self.most:
             raise RejectedError(Reason.SIZE, f"{where} has {len(raw)} elements, more than {self.most}")
         return tuple(self.of.unpack(element, f"{where}[{index}]") for index, element in enumerate(raw))
@@ -262,63 +262,11 @@ class Many:
     def check(self, value: Any, where: str) -> None:
         """Judge a value; see `Spec.check`."""
         if type(value) is not tuple:
-            raise _wrong_type(where, "a tuple", value)
+            raise wrong_type(where, "a tuple", value)
         if len(value) > self.most:
             raise RejectedError(Reason.SIZE, f"{where} has {len(value)} elements, more than {self.most}")
         for index, element in enumerate(value):
             self.of.check(element, f"{where}[{index}]")
-
-
-@dataclasses.dataclass(frozen=True)
-class Counts(Scalar):
-    """A map of at most ``most`` short texts to counts."""
-
-    most: int = 64
-
-    def check(self, value: Any, where: str) -> None:
-        """Judge a value; see `Spec.check`."""
-        if type(value) is not dict:
-            raise _wrong_type(where, "a map", value)
-        if len(value) > self.most:
-            raise RejectedError(Reason.SIZE, f"{where} has {len(value)} entries, more than {self.most}")
-        for name, count in value.items():
-            Text(64).check(name, f"a name in {where}")
-            Int().check(count, f"{where}[{name}]")
-
-
-@dataclasses.dataclass(frozen=True)
-class JsonObject(Scalar):
-    """A map of texts to what JSON can hold, at most ``deepest`` levels."""
-
-    deepest: int = 4
-
-    def check(self, value: Any, where: str) -> None:
-        """Judge a value; see `Spec.check`."""
-        if type(value) is not dict:
-            raise _wrong_type(where, "a map", value)
-        self._check_any(value, where, self.deepest)
-
-    def _check_any(self, value: Any, where: str, levels: int) -> None:
-        if levels < 0:
-            raise RejectedError(Reason.SIZE, f"{where} is nested too deep")
-        match value:
-            case dict() | list() if len(value) > MOST_ELEMENTS:
-                raise RejectedError(Reason.SIZE, f"{where} has {len(value)} elements, more than {MOST_ELEMENTS}")
-            case dict():
-                for name, element in value.items():
-                    Text(128).check(name, f"a name in {where}")
-                    self._check_any(element, f"{where}.{name}", levels - 1)
-            case list():
-                for element in value:
-                    self._check_any(element, where, levels - 1)
-            case float() if not math.isfinite(value):
-                raise RejectedError(Reason.NONFINITE, f"{where} is {value}")
-            case str():
-                Text(MOST_CHARACTERS).check(value, where)
-            case None | bool() | int() | float():
-                pass
-            case _:
-                raise _wrong_type(where, "a JSON value", value)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -338,7 +286,7 @@ class Record:
     def check(self, value: Any, where: str) -> None:
         """Judge a value; see `Spec.check`. A structure has checked itself when it was made."""
         if type(value) is not self.of:
-            raise _wrong_type(where, self.of.__name__, value)
+            raise wrong_type(where, self.of.__name__, value)
 
 
 class Structure:
@@ -377,7 +325,7 @@ class Structure:
 def map_of(raw: object, names: AbstractSet[str], where: str) -> dict[str, Any]:
     """Return a map that has exactly those names."""
     if type(raw) is not dict:
-        raise _wrong_type(where, "a map", raw)
+        raise wrong_type(where, "a map", raw)
     missing, unknown = names - raw.keys(), raw.keys() - names
     if missing or unknown:
         told = [f"missing {', '.join(sorted(missing))}"] if missing else []
@@ -402,5 +350,6 @@ def _all_finite_halves(bits: NDArray[np.uint16]) -> bool:
     return all((block & _BFLOAT16_EXPONENT).max() < _BFLOAT16_EXPONENT for block in blocks)
 
 
-def _wrong_type(where: str, wanted: str, value: object) -> RejectedError:
+def wrong_type(where: str, wanted: str, value: object) -> RejectedError:
+    """Return the rejection of a value of another type than a field holds."""
     return RejectedError(Reason.TYPE, f"{where} is not {wanted} but {type(value).__name__}")
