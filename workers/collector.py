@@ -8,7 +8,8 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from hoz_dist.a3c.loss import Loss, LossWeights, a3c_loss
+from hoz_dist.a3c.differentiation import Differentiator
+from hoz_dist.a3c.loss import Loss
 from hoz_dist.a3c.rollout import Rollout
 from hoz_dist.config import RunConfig
 from hoz_dist.graph.scene_graph import SceneGraph
@@ -56,6 +57,7 @@ class Collector:
         self._clock = clock or StageClock()
         self._policy: ActorCritic = make_policy(config.policy, config.seed)
         self.parameters = FlatParameters(self._policy)
+        self._differentiator = Differentiator(config, self._policy, self.parameters)
         self._bank = GraphBank(config.zones, config.edge_cost)
         self._state: State = self._policy.initial_state(config.batch)
 
@@ -106,32 +108,8 @@ class Collector:
         observation = Observation(*map(np.stack, zip(*observations, strict=True)))
         guidance = Guidance(*map(torch.stack, zip(*(decision.guidance for decision in decisions), strict=True)))
         with self._clock("differentiate"):
-            loss = self._differentiate(rollout, observation, guidance, start)
+            loss = self._differentiator.on_policy(rollout, observation, guidance, start, self._bank)
         return Update(self.parameters.gradients.numpy(), rollout.frames, loss, finished)
-
-    def _differentiate(self, rollout: Rollout, observation: Observation, guidance: Guidance, start: State) -> Loss:
-        config = self._config
-        unrolled = self._policy.unroll(observation, start, guidance, self._bank)
-        weights = LossWeights(
-            discount=config.discount,
-            gae_lambda=config.gae_lambda,
-            value=config.value_weight,
-            entropy=config.entropy_weight,
-            scene=config.scene_weight,
-        )
-        scenes = torch.from_numpy(observation.scene)
-        loss = a3c_loss(rollout, unrolled.logits, unrolled.values, weights, unrolled.scene_logits, scenes)
-        self.parameters.gradients.zero_()
-        loss.total.backward()  # type: ignore[no-untyped-call]
-        clip_norm(self.parameters.gradients, config.gradient_norm)
-        return loss
-
-
-def clip_norm(gradient: Tensor, largest: float) -> None:
-    """Scale a gradient down in place if its Euclidean norm is above ``largest``."""
-    norm = float(gradient.norm())
-    if norm > largest:
-        gradient.mul_(largest / norm)
 
 
 def _stack(arrays: Iterable[NDArray[np.generic]]) -> Tensor:

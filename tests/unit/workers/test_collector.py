@@ -11,7 +11,7 @@ from hoz_dist.nav.episode import EpisodeResult
 from hoz_dist.nav.rooms import RoomId
 from hoz_dist.sim.batch_env import BatchEnv
 from tests.unit.sim.making import random_views
-from workers.collector import Collector, clip_norm
+from workers.collector import Collector
 
 CONFIG = RunConfig(batch=6, rollout_steps=8)
 
@@ -73,11 +73,3 @@ def test_a_new_scene_graph_replaces_the_copies_of_running_episodes() -> None:
     collector.use_graph(scene_graph("kitchen", 2))
     assert (collector._state.zone.scene == -1).all()
     assert (before.scene == 0).all()
-
-
-def test_clipping_scales_only_what_is_too_long() -> None:
-    long, short = torch.tensor([3.0, 4.0]), torch.tensor([0.3, 0.4])
-    clip_norm(long, 1.0)
-    clip_norm(short, 1.0)
-    torch.testing.assert_close(long, torch.tensor([0.6, 0.8]))
-    torch.testing.assert_close(short, torch.tensor([0.3, 0.4]))

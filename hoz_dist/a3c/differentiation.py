@@ -1,0 +1,73 @@
+"""From a rollout to the gradient of its loss by the flat parameters."""
+
+import torch
+from torch import Tensor
+
+from hoz_dist.a3c.loss import Loss, LossWeights, a3c_loss
+from hoz_dist.a3c.rollout import Rollout
+from hoz_dist.config import RunConfig
+from hoz_dist.nav.observation import Observation
+from hoz_dist.policy.actor_critic import ActorCritic, State, Unrolled
+from hoz_dist.policy.graph_bank import GraphBank
+from hoz_dist.policy.navigator import Guidance
+from hoz_dist.policy.parameters import FlatParameters
+from hoz_dist.policy.recurrent import Tape
+
+
+class Differentiator:
+    """Computes gradients of rollouts; each replaces the one before.
+
+    Args:
+        config: Configuration of the run: the loss's weights, and the largest norm of a gradient.
+        policy: The network.
+        parameters: Its flat parameters, which get the gradients.
+    """
+
+    def __init__(self, config: RunConfig, policy: ActorCritic, parameters: FlatParameters) -> None:
+        self._policy = policy
+        self._parameters = parameters
+        self._largest_norm = config.gradient_norm
+        self._weights = LossWeights(
+            discount=config.discount,
+            gae_lambda=config.gae_lambda,
+            value=config.value_weight,
+            entropy=config.entropy_weight,
+            scene=config.scene_weight,
+        )
+
+    def on_policy(
+        self,
+        rollout: Rollout,
+        observation: Observation,
+        guidance: Guidance,
+        start: State,
+        bank: GraphBank,
+        tape: Tape | None = None,
+    ) -> Loss:
+        """Compute the gradient of a rollout that was acted on the parameters as they are.
+
+        Args:
+            rollout: T steps of B episodes.
+            observation: What was observed, [T, B, ...].
+            guidance: What was decided besides the actions, [T, B].
+            start: State before the first step.
+            bank: The scene graphs that were used.
+            tape: What acting has recorded of the steps; see `ActorCritic.unroll`.
+        """
+        return self._descend(rollout, self._policy.unroll(observation, start, guidance, bank, tape), observation)
+
+    def _descend(self, rollout: Rollout, unrolled: Unrolled, observation: Observation) -> Loss:
+        """Compute the loss and its gradient, clipped."""
+        scenes = torch.from_numpy(observation.scene)
+        loss = a3c_loss(rollout, unrolled.logits, unrolled.values, self._weights, unrolled.scene_logits, scenes)
+        self._parameters.gradients.zero_()
+        loss.total.backward()  # type: ignore[no-untyped-call]
+        clip_norm(self._parameters.gradients, self._largest_norm)
+        return loss
+
+
+def clip_norm(gradient: Tensor, largest: float) -> None:
+    """Scale a gradient down in place if its Euclidean norm is above ``largest``."""
+    norm = float(gradient.norm())
+    if norm > largest:
+        gradient.mul_(largest / norm)
