@@ -4,10 +4,12 @@ The vector is what the optimiser steps, what is sent, and what a checkpoint hold
 between those.
 """
 
+from collections.abc import Iterator
+
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from torch import nn
+from torch import Tensor, nn
 
 from hoz_dist.policy.actor_critic import ActorCritic
 from hoz_dist.policy.settings import PolicySettings
@@ -28,16 +30,27 @@ class FlatParameters:
     """
 
     def __init__(self, module: nn.Module) -> None:
-        parameters = list(module.parameters())
-        self.values = torch.empty(sum(p.numel() for p in parameters))
+        self._parameters = list(module.parameters())
+        self.values = torch.cat([parameter.detach().flatten() for parameter in self._parameters])
         self.gradients = torch.zeros_like(self.values)
-        start = 0
-        for parameter in parameters:
-            end = start + parameter.numel()
-            self.values[start:end] = parameter.detach().flatten()
-            parameter.data = self.values[start:end].view_as(parameter)
-            parameter.grad = self.gradients[start:end].view_as(parameter)
-            start = end
+        for parameter, gradient in zip(self._parameters, self._views(self.gradients), strict=True):
+            parameter.grad = gradient
+        self.live_in(self.values)
+
+    def live_in(self, values: Tensor) -> None:
+        """Move the parameters into other memory and take on its numbers: who changes them there changes them here.
+
+        Args:
+            values: float32 [P], contiguous.
+        """
+        self.values = values
+        for parameter, value in zip(self._parameters, self._views(values), strict=True):
+            parameter.data = value
+
+    def _views(self, flat: Tensor) -> Iterator[Tensor]:
+        """Return the part of a flat vector [P] that belongs to each parameter, in its shape."""
+        parts = flat.split([parameter.numel() for parameter in self._parameters])
+        return (part.view_as(parameter) for part, parameter in zip(parts, self._parameters, strict=True))
 
     def load(self, vector: NDArray[np.float32]) -> None:
         """Replace the parameters.
