@@ -1,4 +1,4 @@
-"""Measuring: contenders that are to be compared take turns, so that a machine that slows down slows down all of them."""
+"""Measuring: what is to be compared takes turns, so that a machine that slows down slows down all of it."""
 
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence

@@ -1,0 +1,89 @@
+"""`hoz-dist bench learner`: from a gradient's bytes to changed parameters, beside the optimiser alone."""
+
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from functools import partial
+from typing import NamedTuple
+
+import torch
+
+from hoz_dist.bench.report import Metric
+from hoz_dist.bench.samples import gradient
+from hoz_dist.bench.timing import Contender, Progress, rate, run_contests, seconds_per_call
+from hoz_dist.config import Compression, RunConfig
+from hoz_dist.policy.parameters import initial_parameters
+from hoz_dist.policy.settings import Preset
+from hoz_dist.wire.protocol.answers import Accepted
+from hoz_dist.wire.protocol.codec import checksum, decode, encode
+from hoz_dist.wire.protocol.pushes import GradientPush
+from learner.core import LearnerCore
+from learner.events import GradientReceived, Reply
+from learner.optimizer import BETAS, EPSILON
+
+
+class _Received(NamedTuple):
+    """A push as it comes out of Zenoh."""
+
+    payload: bytes
+    attachment: bytes
+
+
+def bench_learner(
+    presets: Sequence[Preset],
+    codecs: Sequence[Compression],
+    *,
+    seconds: float,
+    repeats: int,
+    progress: Progress,
+) -> dict[str, Metric]:
+    """Measure how long a gradient takes in one thread: checksum, decoding, checks, and the update.
+
+    The limit is fused Adam alone on as many parameters. The ratio of the two is taken of measurements that follow each
+    other, and its limit is 1.
+
+    Args:
+        presets: Sizes of the network.
+        codecs: How the gradient travelled.
+        seconds: Length of one measurement.
+        repeats: Measurements of each figure.
+        progress: Told how far the work is.
+    """
+    cases = [(preset, codec) for preset in presets for codec in codecs]
+    samples = run_contests([partial(_applying, *case, seconds) for case in cases], repeats, progress)
+    metrics = {}
+    for preset, codec in cases:
+        name = f"learner_{preset}_{codec}"
+        ours, alone = samples[name], samples[f"{name}, Adam alone"]
+        ratios = [mine / bare for mine, bare in zip(ours, alone, strict=True)]
+        metrics[f"{name}_ms"] = Metric.of(ours, "ms", alone)
+        metrics[f"{name}_ratio"] = Metric.of(ratios, "x Adam alone", 1.0)
+    return metrics
+
+
+@contextmanager
+def _applying(preset: Preset, codec: Compression, seconds: float) -> Iterator[Mapping[str, Contender]]:
+    config = RunConfig(preset=preset, compress=codec)
+    parameters = initial_parameters(config.policy, config.seed)
+    core = LearnerCore(config, parameters)
+    push = GradientPush("a0", 1, 0, core.epoch, 0, config.batch, gradient(parameters.size))
+
+    def receive() -> _Received:
+        payload = encode(replace(push, sequence=core.version, version=core.version))
+        return _Received(payload, checksum(payload))
+
+    def apply(received: _Received) -> None:
+        assert checksum(received.payload) == received.attachment  # noqa: S101 - measured: the server's first check
+        message = decode(received.payload, GradientPush)
+        effects = core.handle(GradientReceived(0, message), time.monotonic())
+        assert any(isinstance(effect, Reply) and isinstance(effect.answer, Accepted) for effect in effects)  # noqa: S101
+
+    tensor = torch.from_numpy(parameters.copy())
+    tensor.grad = torch.from_numpy(push.gradient)
+    adam = torch.optim.Adam([tensor], lr=config.learning_rate, betas=BETAS, eps=EPSILON, fused=True)
+    name = f"learner_{preset}_{codec}"
+    yield {
+        name: lambda: 1000 * seconds_per_call(receive, apply, seconds),
+        f"{name}, Adam alone": lambda: 1000 / rate(adam.step, seconds),
+    }

@@ -1,0 +1,54 @@
+"""Made-up observations, graphs and gradients: speed does not depend on what they say, only on their shapes."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hoz_dist.graph.scene_graph import SceneGraph
+from hoz_dist.nav.actions import NO_ACTION
+from hoz_dist.nav.categories import SCENES, TARGETS
+from hoz_dist.nav.observation import Observation
+from hoz_dist.policy.graph_bank import GraphBank
+from hoz_dist.policy.settings import PolicySettings
+
+SEEN_SHARE = 0.15
+"""Share of the categories that a view shows."""
+FIRST_SHARE = 1 / 30
+"""Share of the steps at which an episode begins."""
+
+
+def observations(settings: PolicySettings, *shape: int) -> Observation:
+    """Make observations of a shape, [B] or [T, B]."""
+    rng = np.random.default_rng(0)
+    seen = (rng.random((*shape, len(TARGETS))) < SEEN_SHARE)[..., None]
+    detections = rng.random((*shape, len(TARGETS), 5), dtype=np.float32)
+    detections[..., 4] = 1.0
+    return Observation(
+        features=rng.standard_normal((*shape, settings.channels, settings.grid, settings.grid), dtype=np.float32),
+        detections=detections * seen,
+        appearance=rng.random((*shape, len(TARGETS), settings.channels), dtype=np.float32) * seen,
+        target=rng.integers(len(TARGETS), size=shape),
+        previous_action=rng.integers(NO_ACTION + 1, size=shape),
+        scene=rng.integers(len(SCENES), size=shape),
+        first=rng.random(shape) < FIRST_SHARE,
+    )
+
+
+def scene_graph(scene: str, zones: int) -> SceneGraph:
+    """Make a scene graph of K zones."""
+    rng = np.random.default_rng(SCENES.index(scene))
+    edges = rng.uniform(0.01, 0.3, (zones, zones))
+    edges = (edges + edges.T) / 2
+    np.fill_diagonal(edges, 1.0)
+    return SceneGraph(scene, 1, (f"{scene}/1",), TARGETS, rng.random((zones, len(TARGETS))), edges)
+
+
+def graph_bank(zones: int) -> GraphBank:
+    """Make the graphs of all scenes."""
+    return GraphBank.of({scene: scene_graph(scene, zones) for scene in SCENES}, zones, "product")
+
+
+def gradient(size: int) -> NDArray[np.float32]:
+    """Make a gradient [P] that is short enough for every run, of entries as unequal as a network's."""
+    rng = np.random.default_rng(0)
+    values = rng.standard_normal(size, dtype=np.float32) ** 3
+    return np.asarray(values * np.float32(0.5 / np.linalg.norm(values)))
