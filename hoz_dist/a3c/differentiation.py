@@ -1,5 +1,7 @@
 """From a rollout to the gradient of its loss by the flat parameters."""
 
+from typing import NamedTuple
+
 import torch
 from torch import Tensor
 
@@ -12,6 +14,23 @@ from hoz_dist.policy.graph_bank import GraphBank
 from hoz_dist.policy.navigator import Guidance
 from hoz_dist.policy.parameters import FlatParameters
 from hoz_dist.policy.recurrent import Tape
+
+
+class Behaviour(NamedTuple):
+    """What another policy did in T steps of B episodes; see `Rollout` for autoreset."""
+
+    actions: Tensor
+    """int64 [T, B]."""
+    rewards: Tensor
+    """float32 [T, B]."""
+    terminated: Tensor
+    """Whether the episode ended by itself at the step, bool [T, B]."""
+    truncated: Tensor
+    """Whether the episode was cut off at the step, bool [T, B]."""
+    valid: Tensor
+    """Whether the action was taken, and is to be learnt from, bool [T, B]."""
+    log_probabilities: Tensor
+    """Log-probabilities of the actions under that policy, float32 [T, B]."""
 
 
 class Differentiator:
@@ -56,6 +75,39 @@ class Differentiator:
         """
         return self._descend(rollout, self._policy.unroll(observation, start, guidance, bank, tape), observation)
 
+    def off_policy(
+        self, behaviour: Behaviour, observation: Observation, guidance: Guidance, start: State, bank: GraphBank
+    ) -> tuple[Loss, State]:
+        """Compute the gradient of a rollout that was acted on other parameters.
+
+        Args:
+            behaviour: T steps of B episodes.
+            observation: What was observed at them, and after the last one, [T + 1, B, ...].
+            guidance: What was decided besides the actions, [T + 1, B].
+            start: State before the first step.
+            bank: The scene graphs that were used.
+
+        Returns:
+            The loss, and the state of these parameters after the last step.
+        """
+        steps = len(behaviour.actions)
+        seen, after = (Observation(*(part[rows] for part in observation)) for rows in _split(steps))
+        guided, guided_after = (Guidance(*(part[rows] for part in guidance)) for rows in _split(steps))
+        unrolled = self._policy.unroll(seen, start, guided, bank)
+        with torch.no_grad():
+            bootstrap = self._policy.unroll(after, unrolled.state, guided_after, bank).values[0]
+        rollout = Rollout(
+            actions=behaviour.actions,
+            rewards=behaviour.rewards,
+            terminated=behaviour.terminated,
+            truncated=behaviour.truncated,
+            valid=behaviour.valid,
+            values=unrolled.values.detach(),
+            bootstrap=bootstrap,
+            log_probabilities=behaviour.log_probabilities,
+        )
+        return self._descend(rollout, unrolled, seen), unrolled.state
+
     def _descend(self, rollout: Rollout, unrolled: Unrolled, observation: Observation) -> Loss:
         """Compute the loss and its gradient, clipped."""
         scenes = torch.from_numpy(observation.scene)
@@ -64,6 +116,11 @@ class Differentiator:
         loss.total.backward()  # type: ignore[no-untyped-call]
         clip_norm(self._parameters.gradients, self._largest_norm)
         return loss
+
+
+def _split(steps: int) -> tuple[slice, slice]:
+    """Return the rows of the steps, and of what follows them."""
+    return slice(steps), slice(steps, steps + 1)
 
 
 def clip_norm(gradient: Tensor, largest: float) -> None:

@@ -8,6 +8,7 @@ from torch.nn import functional
 
 from hoz_dist.a3c.returns import generalized_advantages
 from hoz_dist.a3c.rollout import Rollout
+from hoz_dist.a3c.vtrace import vtrace_advantages
 
 ADVANTAGE_FLOOR = 0.05
 """Least scale by which advantages are divided, so that noise is not blown up when nothing differs."""
@@ -55,6 +56,8 @@ def a3c_loss(
     Advantages are divided by their standard deviation in the rollout: success comes rarely at first and often later,
     and the entropy bonus keeps its meaning against either.
 
+    A rollout that another policy acted is corrected by V-trace.
+
     Args:
         rollout: T steps of B episodes.
         logits: Of the policy at each step, [T, B, actions].
@@ -65,11 +68,15 @@ def a3c_loss(
     """
     valid = rollout.valid.float()
     count = valid.sum().clamp(min=1.0)
-    advantages, returns = generalized_advantages(rollout, weights.discount, weights.gae_lambda)
-    scale = advantages[rollout.valid].std(correction=0).clamp(min=ADVANTAGE_FLOOR)
-
     log_probabilities = functional.log_softmax(logits, dim=-1)
     chosen = log_probabilities.gather(-1, rollout.actions.unsqueeze(-1)).squeeze(-1)
+    if rollout.log_probabilities is None:
+        advantages, returns = generalized_advantages(rollout, weights.discount, weights.gae_lambda)
+    else:
+        advantages, returns = vtrace_advantages(rollout, chosen.detach(), weights.discount, weights.gae_lambda)
+    learnt = advantages[rollout.valid] if rollout.valid.any() else advantages.new_zeros(1)
+    scale = learnt.std(correction=0).clamp(min=ADVANTAGE_FLOOR)
+
     policy = -(chosen * (advantages / scale) * valid).sum() / count
     value = 0.5 * ((values - returns).square() * valid).sum() / count
     entropy = -((log_probabilities.exp() * log_probabilities).sum(-1) * valid).sum() / count

@@ -24,14 +24,20 @@ def generalized_advantages(rollout: Rollout, discount: float, gae_lambda: float)
     Returns:
         Advantages and returns (value targets), both float32 [T, B]; zero advantage where a step is not valid.
     """
-    next_values = torch.cat([rollout.values[1:], rollout.bootstrap.unsqueeze(0)])
-    continues = (~rollout.terminated).float()
-    valid = rollout.valid.float()
-    deltas = (rollout.rewards + discount * continues * next_values - rollout.values) * valid
-    decay = discount * gae_lambda * (~(rollout.terminated | rollout.truncated)).float() * valid
-    advantages = torch.empty_like(deltas)
-    ahead = torch.zeros_like(rollout.bootstrap)
-    for t in range(len(deltas) - 1, -1, -1):
-        ahead = deltas[t] + decay[t] * ahead
-        advantages[t] = ahead
+    advantages = backward_sum(rollout.deltas(discount), rollout.decay(discount * gae_lambda))
     return advantages, advantages + rollout.values
+
+
+def backward_sum(terms: Tensor, decay: Tensor) -> Tensor:
+    """Return S with ``S[t] = terms[t] + decay[t] * S[t + 1]``, and 0 after the last step.
+
+    Args:
+        terms: [T, B].
+        decay: [T, B].
+    """
+    sums = torch.empty_like(terms)
+    ahead = torch.zeros_like(terms[0])
+    for t in range(len(terms) - 1, -1, -1):
+        ahead = terms[t] + decay[t] * ahead
+        sums[t] = ahead
+    return sums

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+import torch
 from torch import Tensor
 
 
@@ -22,13 +23,26 @@ class Rollout:
     truncated: Tensor
     """Whether the episode was cut off at the step, bool [T, B]."""
     valid: Tensor
-    """Whether the action was taken, bool [T, B]."""
+    """Whether the action was taken, and is to be learnt from, bool [T, B]."""
     values: Tensor
-    """V of the behaviour parameters at each step, float32 [T, B]."""
+    """V of the parameters that are differentiated at each step, float32 [T, B]."""
     bootstrap: Tensor
     """V of the observation after the last step, float32 [B]."""
+    log_probabilities: Tensor | None = None
+    """Log-probabilities of the actions under the behaviour policy, float32 [T, B]; None if it is the policy that is
+    differentiated."""
 
     @property
     def frames(self) -> int:
         """Number of actions taken."""
         return int(self.valid.sum())
+
+    def deltas(self, discount: float) -> Tensor:
+        """Return the one-step errors of the values, ``r + discount * V' - V``, [T, B]; 0 where a step is not valid."""
+        next_values = torch.cat([self.values[1:], self.bootstrap.unsqueeze(0)])
+        continues = (~self.terminated).float()
+        return (self.rewards + discount * continues * next_values - self.values) * self.valid.float()
+
+    def decay(self, factor: float) -> Tensor:
+        """Return ``factor`` where the episode goes on after the step, [T, B]; 0 where it ends or is not valid."""
+        return factor * (~(self.terminated | self.truncated)).float() * self.valid.float()
