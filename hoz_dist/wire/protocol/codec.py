@@ -1,26 +1,28 @@
 """Messages to bytes and back.
 
-A message is one msgpack map: ``v`` (protocol version), ``kind``, and the fields of the message. Decoding hostile bytes
-raises `RejectedError` and nothing else, and allocates no more than a small multiple of their length: a tensor is not
-copied, and the number of all other values is bounded by the kind of the message.
+A message is one msgpack map: ``v`` (protocol version), ``kind``, and the fields of the message; and behind it the bytes
+of its bulk tensors, if its kind has some. Decoding hostile bytes raises `RejectedError` and nothing else, and allocates
+no more than a small multiple of their length: bulk is not copied, and the number of all other values is bounded by the
+kind of the message.
 """
 
 from collections.abc import Callable
-from typing import Final, TypeVar
+from typing import Any, Final, TypeVar
 
 import msgpack
 import xxhash
 
 from hoz_dist.wire.protocol.answers import Accepted, Busy, Refused
+from hoz_dist.wire.protocol.bulk import BulkReader, Layout
 from hoz_dist.wire.protocol.graph_messages import PlanReply, RoomGraphReply, SceneGraphReply
 from hoz_dist.wire.protocol.message import Message
 from hoz_dist.wire.protocol.parameters import ParametersHead, ParametersShard
 from hoz_dist.wire.protocol.pushes import EpisodesPush, GradientPush, RoomGraphPush
 from hoz_dist.wire.protocol.rejection import OtherVersionError, Reason, RejectedError, shown
 from hoz_dist.wire.protocol.run_messages import ConfigReply, StatusReply
-from hoz_dist.wire.protocol.schema import MOST_CHARACTERS, MOST_ELEMENTS
+from hoz_dist.wire.protocol.schema import MOST_CHARACTERS, MOST_ELEMENTS, Bulky
 
-PROTOCOL_VERSION: Final = 1
+PROTOCOL_VERSION: Final = 2
 MESSAGES: Final[dict[str, type[Message]]] = {
     message.KIND: message
     for message in (
@@ -52,11 +54,24 @@ M = TypeVar("M", bound=Message)
 
 def encode(message: Message) -> bytes:
     """Return the bytes of a message."""
+    return b"".join(lay_out(message).parts())
+
+
+def lay_out(message: Message) -> Layout:
+    """Return what the bytes of a message consist of, without copying its bulk."""
+    bulk: list[memoryview] = []
+
+    def put_behind(tensor: object) -> object:
+        if not isinstance(tensor, Bulky):
+            raise TypeError(tensor)
+        bulk.append(tensor.data)
+        return tensor.description
+
     fields = {"v": PROTOCOL_VERSION, "kind": message.KIND, **message.pack()}
-    bulk = sum(_tensor_bytes(value) for value in fields.values())
+    inside = sum(_tensor_bytes(value) for value in fields.values())
     # A buffer that has to grow copies a large tensor several times.
-    packed: bytes = msgpack.Packer(buf_size=bulk + _SPARE).pack(fields)
-    return packed
+    head: bytes = msgpack.Packer(buf_size=inside + _SPARE, default=put_behind).pack(fields)
+    return Layout(head, tuple(bulk))
 
 
 def decode(data: bytes, *expected: type[M]) -> M:
@@ -75,11 +90,16 @@ def decode(data: bytes, *expected: type[M]) -> M:
     longest = max(message.MOST_BYTES for message in expected)
     if len(data) > longest:
         raise RejectedError(Reason.SIZE, f"the message has {len(data)} bytes, more than {longest}")
-    fields = _unpack_map(data, max(message.MOST_VALUES for message in expected))
+    head = data[: max(message.most_head_bytes() for message in expected)]
+    fields, length = _unpack_map(head, max(message.MOST_VALUES for message in expected))
     version, kind = fields.pop("v", None), fields.pop("kind", None)
     _check_version(version)
     for message in expected:
         if kind == message.KIND:
+            bulk = BulkReader(data, length)
+            if message.BULK:
+                bulk.attach(message.SPECS, fields)
+            bulk.finish()
             return message.unpack(fields, kind)  # type: ignore[return-value]  # unpack of a subclass makes that subclass
     wanted = " or ".join(message.KIND for message in expected)
     raise RejectedError(Reason.KIND, f"the message is a {shown(kind)}, not a {wanted}")
@@ -106,8 +126,8 @@ def _check_version(version: object) -> None:
         raise OtherVersionError(version, PROTOCOL_VERSION)
 
 
-def _unpack_map(data: bytes, most_values: int) -> dict[object, object]:
-    """Return the map that the bytes hold.
+def _unpack_map(data: bytes, most_values: int) -> tuple[dict[str, Any], int]:
+    """Return the map that the bytes begin with, and its length.
 
     Raises:
         RejectedError: They are something else, hold more than ``most_values`` values, or a key occurs twice.
@@ -121,6 +141,7 @@ def _unpack_map(data: bytes, most_values: int) -> dict[object, object]:
         if left < 0:
             raise RejectedError(Reason.SIZE, f"the message holds more than {most_values} values")
 
+    length = len(data)
     try:
         fields = msgpack.unpackb(
             data,
@@ -132,12 +153,14 @@ def _unpack_map(data: bytes, most_values: int) -> dict[object, object]:
             object_pairs_hook=lambda pairs: _map_without_repeats(pairs, spend),
             list_hook=lambda values: _counted(values, spend),
         )
+    except msgpack.ExtraData as error:
+        fields, length = error.unpacked, length - len(error.extra)
     except (ValueError, TypeError, OverflowError, RecursionError, msgpack.UnpackException) as error:
-        detail = f"the {len(data)} bytes are not one msgpack map ({type(error).__name__})"
+        detail = f"the message does not begin with a msgpack map ({type(error).__name__})"
         raise RejectedError(Reason.MALFORMED, detail) from error
     if type(fields) is not dict:
         raise RejectedError(Reason.MALFORMED, f"the message is a {type(fields).__name__}, not a map")
-    return fields
+    return fields, length
 
 
 def _counted(values: list[object], spend: Callable[[int], None]) -> list[object]:

@@ -47,11 +47,18 @@ class Message(Structure):
         KIND: Name on the wire.
         MOST_BYTES: Longest encoded form that is read at all.
         MOST_VALUES: Largest number of values, keys and elements of lists and maps together.
+        BULK: Whether fields of it are bulk tensors; its map then has at most `SMALL_BYTES`.
     """
 
     KIND: ClassVar[str]
     MOST_BYTES: ClassVar[int] = SMALL_BYTES
     MOST_VALUES: ClassVar[int] = 16 * 1024
+    BULK: ClassVar[bool] = False
+
+    @classmethod
+    def most_head_bytes(cls) -> int:
+        """Return the length of the longest map that is read of such a message."""
+        return SMALL_BYTES if cls.BULK else cls.MOST_BYTES
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,12 +5,11 @@ cannot know (the number of parameters, the epoch, how old a gradient may be) is 
 """
 
 from dataclasses import dataclass
-from typing import Annotated, ClassVar
+from typing import Annotated, ClassVar, Final
 
-import numpy as np
-from numpy.typing import NDArray
-
+from hoz_dist.gradient_forms import Gradient
 from hoz_dist.nav.episode import EpisodeResult
+from hoz_dist.wire.protocol.gradients import GradientField
 from hoz_dist.wire.protocol.graph_messages import RoomGraphFields
 from hoz_dist.wire.protocol.message import (
     EPISODES,
@@ -19,11 +18,12 @@ from hoz_dist.wire.protocol.message import (
     MAX_PARAMETERS,
     NAME,
     SMALL_BYTES,
-    VECTOR,
     Message,
 )
 from hoz_dist.wire.protocol.rejection import Reason, RejectedError
 from hoz_dist.wire.protocol.schema import Int, Real
+
+GRADIENT: Final = GradientField()
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,16 +49,17 @@ class GradientPush(Push):
         epoch: Epoch of the parameters that it was computed on.
         version: Version of the parameters that it was computed on.
         frames: Environment steps that it was computed from.
-        gradient: [P] f32, in the order of the parameter vector.
+        gradient: In the order of the parameter vector, in the form of the run's codec; [P] f32 in full.
     """
 
     KIND: ClassVar[str] = "gradient"
     MOST_BYTES: ClassVar[int] = 4 * MAX_PARAMETERS + SMALL_BYTES
+    BULK: ClassVar[bool] = True
 
     epoch: Annotated[int, Int()]
     version: Annotated[int, Int()]
     frames: Annotated[int, Int(1, MAX_FRAMES)]
-    gradient: Annotated[NDArray[np.float32], VECTOR]
+    gradient: Annotated[Gradient, GRADIENT]
 
 
 @dataclass(frozen=True, eq=False)

@@ -26,6 +26,8 @@ class Reason(StrEnum):
     """A tensor has another element type than it should."""
     SHAPE = "shape"
     """A tensor has another shape than it should, or not the bytes that its shape needs."""
+    CODEC = "codec"
+    """A gradient travels in another form than those of the run."""
     NONFINITE = "nonfinite"
     """A number is NaN or infinite."""
     NORM = "norm"

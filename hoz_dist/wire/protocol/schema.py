@@ -10,7 +10,7 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from collections.abc import Set as AbstractSet
-from typing import Annotated, Any, ClassVar, Final, NamedTuple, Protocol, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, ClassVar, Final, Protocol, get_args, get_origin, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -231,7 +231,8 @@ class Tensor:
             raise RejectedError(Reason.RANGE, f"{where} has an element that is not in {self.low}..{self.high}")
 
 
-class Bulky(NamedTuple):
+@dataclasses.dataclass(frozen=True)
+class Bulky:
     """A packed bulk tensor."""
 
     description: dict[str, object]
@@ -287,6 +288,10 @@ class Record:
         """Judge a value; see `Spec.check`. A structure has checked itself when it was made."""
         if type(value) is not self.of:
             raise wrong_type(where, self.of.__name__, value)
+
+    def inner(self, raw: Mapping[str, Any]) -> Mapping[str, Spec]:  # noqa: ARG002 - all such structures have the same
+        """Return the specs of the structure's fields."""
+        return self.of.SPECS
 
 
 class Structure:
