@@ -13,9 +13,10 @@ from hoz_dist.waiting import FIRST_TRY_S, Backoff, Deadline
 from hoz_dist.wire.client.asking import Asking
 from hoz_dist.wire.client.epochs import Epochs
 from hoz_dist.wire.protocol.answers import Accepted, Busy, Refused
-from hoz_dist.wire.protocol.codec import checksum, encode
+from hoz_dist.wire.protocol.codec import lay_out
 from hoz_dist.wire.protocol.pushes import GradientPush, Push
 from hoz_dist.wire.protocol.rejection import Reason
+from hoz_dist.wire.transport.outgoing import Outgoing
 from hoz_dist.wire.transport.session import Session
 from hoz_dist.wire.transport.shared_memory import SharedMemory
 
@@ -47,7 +48,7 @@ class Pusher:
         self._epochs = epochs or Epochs()
         self._asking = Asking(session, stop, self._epochs, attempt_s)
         self._acknowledged = acknowledged
-        self._memory = memory or SharedMemory(on=False)
+        self._outgoing = Outgoing(memory or SharedMemory(on=False))
         self._clock = clock or StageClock()
 
     def push(self, key: str, message: Push, deadline_s: float | None = None) -> Accepted | Refused:
@@ -67,19 +68,16 @@ class Pusher:
             OtherVersionError: The learner speaks another version of the protocol.
             AnotherRunError: The learner has begun another run.
         """
-        payload = encode(message)
-        attachment = checksum(payload)
+        layout = lay_out(message)
         deadline, backoff = Deadline(deadline_s), Backoff(self._stop)
         tries = 0
         if isinstance(message, GradientPush):
             self._epochs.hear(message.epoch)
         while True:
             tries += 1
-            wrapped = self._memory.wrap(payload)  # anew for each try: a paused receiver's may have been written over
+            data, attachment = self._outgoing.payload(layout)  # anew: a paused receiver's may have been written over
             with self._clock("answer"):
-                reply = self._asking.once(
-                    key, deadline, Accepted, Busy, Refused, payload=wrapped, attachment=attachment
-                )
+                reply = self._asking.once(key, deadline, Accepted, Busy, Refused, payload=data, attachment=attachment)
             match reply:
                 case Accepted():
                     if self._acknowledged is not None:

@@ -21,6 +21,7 @@ from hoz_dist.wire.protocol.pushes import EpisodesPush, GradientPush, RoomGraphP
 from hoz_dist.wire.protocol.rejection import OtherVersionError, Reason, RejectedError, shown
 from hoz_dist.wire.protocol.run_messages import ConfigReply, StatusReply
 from hoz_dist.wire.protocol.schema import MOST_CHARACTERS, MOST_ELEMENTS, Bulky
+from hoz_dist.wire.protocol.trajectories import TrajectoryPush
 
 PROTOCOL_VERSION: Final = 2
 MESSAGES: Final[dict[str, type[Message]]] = {
@@ -28,6 +29,7 @@ MESSAGES: Final[dict[str, type[Message]]] = {
     for message in (
         GradientPush,
         EpisodesPush,
+        TrajectoryPush,
         RoomGraphPush,
         Accepted,
         Busy,
@@ -105,7 +107,7 @@ def decode(data: bytes, *expected: type[M]) -> M:
     raise RejectedError(Reason.KIND, f"the message is a {shown(kind)}, not a {wanted}")
 
 
-def checksum(data: bytes) -> bytes:
+def checksum(data: bytes | bytearray) -> bytes:
     """Return the checksum that travels with a payload: its xxh3_64, 8 bytes, big-endian."""
     return xxhash.xxh3_64_digest(data)
 

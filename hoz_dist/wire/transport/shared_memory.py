@@ -10,12 +10,13 @@ sent this way needs a checksum; pushes and parameters have one.
 import logging
 import os
 import threading
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Final
 
 import zenoh
 from zenoh import ZBytes
-from zenoh.shm import GarbageCollect, ShmProvider
+from zenoh.shm import GarbageCollect, ShmProvider, ZShmMut
 
 from hoz_dist.closing import Closing
 from hoz_dist.outage import Outage
@@ -56,16 +57,32 @@ class SharedMemory(Closing):
 
     def wrap(self, payload: bytes) -> ZBytes:
         """Return what to hand to Zenoh: the payload in shared memory, or the payload."""
-        if not self.on or len(payload) < LEAST_BYTES:
-            return ZBytes(payload)
+        return self.gather((payload,), len(payload)) or ZBytes(payload)
+
+    def gather(self, pieces: Iterable[bytes | bytearray], size: int) -> ZBytes | None:
+        """Copy pieces into shared memory, one behind the other.
+
+        Args:
+            pieces: What to copy; each is copied before the next one is asked for.
+            size: Their length together, bytes.
+
+        Returns:
+            What to hand to Zenoh; None, and no piece was asked for, if it must be sent as bytes.
+        """
+        if not self.on or size < LEAST_BYTES:
+            return None
         with self._lock:
-            buffer = self._copied(payload)
+            buffer = self._allocated(size)
             if buffer is None:
                 self.fallbacks += 1
-                return ZBytes(payload)
+                return None
+            place = 0
+            for piece in pieces:
+                buffer[place : place + len(piece)] = piece
+                place += len(piece)
             self.shared += 1
             self._outage.worked()
-            return buffer
+            return ZBytes(buffer)
 
     def close(self) -> None:
         """Let go of the pool, and say how it went."""
@@ -74,19 +91,15 @@ class SharedMemory(Closing):
         if self.shared or self.fallbacks:
             _log.info("%d messages went through shared memory, %d did not fit", self.shared, self.fallbacks)
 
-    def _copied(self, payload: bytes) -> ZBytes | None:
-        """Copy a payload into the pool; None when there is no room."""
+    def _allocated(self, size: int) -> ZShmMut | None:
+        """Return room in the pool; None when there is none."""
         try:
-            pool = self._pool_for(len(payload))
-            if pool is None:
-                return None
+            pool = self._pool_for(size)
             # Not the safe way: it never takes back what a killed receiver held (measured).
-            buffer = pool.alloc(len(payload), GarbageCollect(safe=False))
+            return pool.alloc(size, GarbageCollect(safe=False)) if pool is not None else None
         except zenoh.ZError:
             self._outage.failed("the pool is full")
             return None
-        buffer[:] = payload
-        return ZBytes(buffer)
 
     def _pool_for(self, size: int) -> ShmProvider | None:
         """Return a pool that is large enough for messages of a size, in bytes; None when there is no room for one."""
