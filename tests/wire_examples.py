@@ -10,6 +10,7 @@ from hoz_dist.wire.protocol.message import Message
 from hoz_dist.wire.protocol.parameters import ParametersHead, ParametersShard, head_of
 from hoz_dist.wire.protocol.pushes import EpisodesPush, GradientPush, RoomGraphPush
 from hoz_dist.wire.protocol.run_messages import ConfigReply, LeftProcess, ProcessStatus, StatusReply
+from hoz_dist.wire.protocol.trajectories import Flag, GraphUsed, RoomUsed, Steps, TrajectoryPush
 
 VECTOR = np.array([0.5, -0.25], np.float32)
 HEAD: ParametersHead = head_of(2, 6, VECTOR)
@@ -18,6 +19,25 @@ CATEGORIES = ("Pan", "Sink")
 NODES = np.array([[0.5, 1.0], [0.0, 0.25]])
 EDGES = np.array([[1.0, 0.5], [0.5, 1.0]])
 
+
+def rows(dtype: type[np.generic], *values: float) -> np.ndarray:
+    """Steps of one episode, [T, 1]."""
+    return np.array(values, dtype)[:, np.newaxis]
+
+
+STEPS = Steps(
+    room=rows(np.uint8, 0, 0, 0),
+    view=rows(np.uint16, 32, 48, 48),
+    target=rows(np.uint8, 18, 18, 18),
+    flags=rows(np.uint8, Flag.FIRST | Flag.VALID | Flag.FRESH, Flag.VALID | Flag.TERMINATED, 0),
+    scene=rows(np.uint8, 0, 0, 0),
+    current=rows(np.uint8, 2, 2, 2),
+    subgoal=rows(np.uint8, 1, 1, 1),
+    previous_action=np.array([6], np.uint8),
+    action=rows(np.uint8, 0, 5),
+    reward=rows(np.float32, -0.01, 4.99),
+    log_probability=rows(np.float32, -0.5, -0.25),
+)
 EXAMPLES: tuple[Message, ...] = (
     GradientPush("a0", 7, 2, epoch=2, version=5, frames=40, gradient=np.array([1.0, -2.0], np.float32)),
     EpisodesPush(
@@ -47,4 +67,5 @@ EXAMPLES: tuple[Message, ...] = (
     SceneGraphReply(2, "kitchen", 1, (KITCHEN,), CATEGORIES, NODES, EDGES),
     RoomGraphReply(2, KITCHEN, "5f3a", CATEGORIES, NODES, EDGES),
     PlanReply(2, 0, 1, 1, (0, 1), 0.5),
+    TrajectoryPush("a0", 7, 3, 2, 5, (RoomUsed(KITCHEN, "5f3a"),), (GraphUsed("kitchen", 2, 1),), STEPS),
 )

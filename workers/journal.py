@@ -9,6 +9,7 @@ from pathlib import Path
 from hoz_dist.closing import Closing
 from hoz_dist.wire.protocol.answers import Accepted
 from hoz_dist.wire.protocol.pushes import EpisodesPush, GradientPush, Push, RoomGraphPush
+from hoz_dist.wire.protocol.trajectories import TrajectoryPush
 from workers.json_lines import JsonLines
 
 
@@ -57,7 +58,7 @@ class Journal(Closing):
 def _content(push: Push) -> dict[str, object]:
     """Return what a push adds to the run."""
     match push:
-        case GradientPush():
+        case GradientPush() | TrajectoryPush():
             return {"computed_on": [push.epoch, push.version], "frames": push.frames}
         case EpisodesPush():
             return {"episodes": len(push.episodes)}

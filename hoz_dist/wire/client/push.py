@@ -16,6 +16,7 @@ from hoz_dist.wire.protocol.answers import Accepted, Busy, Refused
 from hoz_dist.wire.protocol.codec import lay_out
 from hoz_dist.wire.protocol.pushes import GradientPush, Push
 from hoz_dist.wire.protocol.rejection import Reason
+from hoz_dist.wire.protocol.trajectories import TrajectoryPush
 from hoz_dist.wire.transport.outgoing import Outgoing
 from hoz_dist.wire.transport.session import Session
 from hoz_dist.wire.transport.shared_memory import SharedMemory
@@ -71,7 +72,7 @@ class Pusher:
         layout = lay_out(message)
         deadline, backoff = Deadline(deadline_s), Backoff(self._stop)
         tries = 0
-        if isinstance(message, GradientPush):
+        if isinstance(message, GradientPush | TrajectoryPush):
             self._epochs.hear(message.epoch)
         while True:
             tries += 1

@@ -23,6 +23,7 @@ from hoz_dist.wire.protocol.message import Message
 from hoz_dist.wire.protocol.pushes import EpisodesPush, GradientPush, Push, RoomGraphPush
 from hoz_dist.wire.protocol.rejection import Reason, RejectedError
 from hoz_dist.wire.protocol.rejections import Rejections
+from hoz_dist.wire.protocol.trajectories import TrajectoryPush
 from hoz_dist.wire.serving.inbox import Inbox, Reaper, Request
 from hoz_dist.wire.serving.snapshots import GraphReply, Snapshots
 from hoz_dist.wire.transport.publishing import NewestPublisher
@@ -47,6 +48,7 @@ class Server(Closing):
         inbox: Where pushes are to wait.
         parameters: Number of parameters of the policy, P: a gradient that is longer is not even copied; None if any
             length will do.
+        rollout_bytes: Length of the longest rollout of the run as a message; None if any length will do.
         clock: Measures how long receiving pushes takes, as the stage ``receive``.
 
     Attributes:
@@ -66,6 +68,7 @@ class Server(Closing):
         graphs: Iterable[SceneGraph | RoomGraph] = (),
         inbox: Inbox | None = None,
         parameters: int | None = None,
+        rollout_bytes: int | None = None,
         clock: StageClock | None = None,
     ) -> None:
         self.inbox = inbox if inbox is not None else Inbox()  # an empty one is false
@@ -78,12 +81,14 @@ class Server(Closing):
         self._most_bytes_of: dict[type[Push], int] = {}
         if parameters is not None:
             self._most_bytes_of[GradientPush] = min(4 * parameters + _BESIDE_GRADIENT, GradientPush.MOST_BYTES)
+        if rollout_bytes is not None:
+            self._most_bytes_of[TrajectoryPush] = min(rollout_bytes, TrajectoryPush.MOST_BYTES)
         self._publishers: dict[str, NewestPublisher] = {}
         for graph in graphs:
             self.put_graph(graph)
         handlers: dict[str, Callable[[Query], None]] = {
             keys.all_grads: lambda query: self._receive(query, GradientPush),
-            keys.all_rollouts: lambda query: self._receive(query, EpisodesPush),
+            keys.all_rollouts: lambda query: self._receive(query, EpisodesPush, TrajectoryPush),
             keys.all_rooms: lambda query: self._receive(query, RoomGraphPush),
             keys.config: self._limited(lambda query: answer(query, keys.config, snapshots.config)),
             keys.status: self._limited(lambda query: answer(query, keys.status, snapshots.status())),
@@ -115,19 +120,19 @@ class Server(Closing):
         for publisher in self._publishers.values():
             publisher.close()
 
-    def _receive(self, query: Query, expected: type[Push]) -> None:
+    def _receive(self, query: Query, *expected: type[Push]) -> None:
         """Check a push, and let it wait for the learner."""
         key = str(query.key_expr)
         try:
             with self._clock("receive"):
-                message, size = self._checked(query, key, expected)
+                message, size = self._checked(query, key, *expected)
         except RejectedError as error:
             self.rejections.count(error.reason, error.detail, sender_of(key))
             answer(query, key, Refused.of(error, self._epoch))
             return
         self.inbox.add(Request(query, message, size, self.rejections, self._epoch))
 
-    def _checked(self, query: Query, key: str, expected: type[Push]) -> tuple[Push, int]:
+    def _checked(self, query: Query, key: str, *expected: type[Push]) -> tuple[Push, int]:
         """Return the message of a push, and the length of its encoded form.
 
         Raises:
@@ -135,13 +140,13 @@ class Server(Closing):
         """
         payload, attachment = query.payload, query.attachment
         size = len(payload) if payload is not None else 0
-        most = self._most_bytes_of.get(expected, expected.MOST_BYTES)
+        most = max(self._most_bytes_of.get(kind, kind.MOST_BYTES) for kind in expected)
         if size > most:  # not even copied
             raise RejectedError(Reason.SIZE, f"the message has {size} bytes, more than {most}")
         data = payload.to_bytes() if payload is not None else b""
         if attachment is None or len(attachment) != _CHECKSUM_BYTES or attachment.to_bytes() != checksum(data):
             raise RejectedError(Reason.CHECKSUM, f"the {size} bytes do not have the checksum sent along")
-        message = decode(data, expected)
+        message = decode(data, *expected)
         if key != self._key_of(message):
             raise RejectedError(Reason.IDENTITY, f"a {message.KIND} of {message.actor} came on {key}")
         return message, size
@@ -151,7 +156,7 @@ class Server(Closing):
         match message:
             case GradientPush():
                 return self._keys.grads(message.actor)
-            case EpisodesPush():
+            case EpisodesPush() | TrajectoryPush():
                 return self._keys.rollouts(message.actor)
             case RoomGraphPush():
                 return self._keys.room(message.actor, message.room)
