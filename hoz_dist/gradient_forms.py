@@ -9,6 +9,9 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+Vector = NDArray[np.float32]
+"""One number for each parameter, float32 [P]."""
+
 INT8_BLOCK: Final = 256
 """Entries that share a scale in an `Int8Gradient`; the last block may have fewer."""
 
@@ -50,7 +53,7 @@ class TopKGradient(NamedTuple):
     """Bits of their values, bfloat16, [k]."""
 
 
-Gradient = NDArray[np.float32] | Bf16Gradient | Int8Gradient | TopKGradient
+Gradient = Vector | Bf16Gradient | Int8Gradient | TopKGradient
 """A gradient in any form; one in full is the vector itself, float32 [P]."""
 
 

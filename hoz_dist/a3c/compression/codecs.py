@@ -1,0 +1,162 @@
+"""What each codec sends of a vector.
+
+A codec takes out of a vector what travels, and leaves the rest: after `Codec.take` the vector is what it was less what
+the receiver will see. `hoz_dist.a3c.compression.compressor` adds that rest to the next gradient, so that nothing is
+lost but what the bound of the norm cuts off.
+
+The learner refuses gradients whose norm is above the run's bound, so what a codec makes of a vector never is.
+"""
+
+from typing import Final, Protocol
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from hoz_dist.gradient_forms import INT8_BLOCK, Bf16Gradient, Gradient, Int8Gradient, TopKGradient, blocks_of
+
+TOP_SHARE: Final = 0.01
+"""Share of the entries that `TopK` sends."""
+MOST_KEPT: Final = 100.0
+"""Largest norm of what `TopK` keeps, in bounds of the norm; see docs/decisions/gradient-codecs.md."""
+_BF16_ROUNDS_UP: Final = 1.0 + 2.0**-8
+"""Rounding to 8 significant bits makes no number larger than by this factor."""
+_LEVELS: Final = 127.0
+"""Largest number of steps in an `Int8Gradient`."""
+_SAMPLE: Final = 65_536
+"""Entries that `TopK` looks at to guess where the largest ones begin."""
+_PIECE: Final = 512
+"""Blocks of an `Int8Gradient` that are worked on at once: they stay in the cache."""
+
+
+class Codec(Protocol):
+    """One way to send a vector."""
+
+    def take(self, vector: Tensor, largest: float) -> Gradient:
+        """Return what travels of a vector, and leave in the vector what does not.
+
+        Args:
+            vector: Float32 [P], finite; changed.
+            largest: Largest Euclidean norm of what travels.
+
+        Returns:
+            Arrays that are valid until the next call.
+        """
+        ...
+
+
+class Bf16:
+    """Sends every entry, rounded to the nearest bfloat16, to the even one of two.
+
+    Args:
+        size: P.
+    """
+
+    def __init__(self, size: int) -> None:
+        self._halves = torch.empty(size, dtype=torch.bfloat16)
+
+    def take(self, vector: Tensor, largest: float) -> Bf16Gradient:
+        """See `Codec.take`. What exceeds the norm is not left but cut off, as without a codec."""
+        clip_norm(vector, largest / _BF16_ROUNDS_UP)
+        self._halves.copy_(vector)
+        vector.sub_(self._halves)
+        return Bf16Gradient(_bits(self._halves))
+
+
+class Int8:
+    """Sends every entry as the nearest of 255 steps from the largest one of its block to its negative.
+
+    Args:
+        size: P.
+    """
+
+    def __init__(self, size: int) -> None:
+        self._size = size
+        # Whole blocks: the last one ends in zeros.
+        self._padded = torch.zeros(blocks_of(size), INT8_BLOCK)
+        self._levels = torch.empty(blocks_of(size), INT8_BLOCK, dtype=torch.int8)
+        self._scales = torch.empty(blocks_of(size), 1)
+
+    def take(self, vector: Tensor, largest: float) -> Int8Gradient:
+        """See `Codec.take`. What exceeds the norm is not left but cut off, as without a codec."""
+        clip_norm(vector, largest)
+        sent = self._padded.view(-1)[: self._size]
+        sent.copy_(vector)
+        pieces = (tensor.split(_PIECE) for tensor in (self._padded, self._levels, self._scales))
+        for values, levels, scales in zip(*pieces, strict=True):
+            torch.div(torch.linalg.vector_norm(values, torch.inf, dim=1, keepdim=True), _LEVELS, out=scales)
+            # A block of zeros, or of numbers so small that its scale is 0, has no steps at all.
+            values.div_(scales.masked_fill(scales == 0.0, 1.0)).round_().clamp_(-_LEVELS, _LEVELS)
+            levels.copy_(values)
+            values.mul_(scales)
+        # Rounding may have made it longer.
+        norm = float(torch.linalg.vector_norm(sent))
+        if norm > largest:
+            self._scales.mul_(largest / norm)
+            sent.mul_(largest / norm)
+        vector.sub_(sent)
+        return Int8Gradient(self._levels.view(-1)[: self._size].numpy(), self._scales.view(-1).numpy())
+
+
+class TopK:
+    """Sends the entries of the largest magnitude, `TOP_SHARE` of all, as bfloat16.
+
+    What exceeds the norm is left for later too, since what is sent is the sum of many gradients. So that what is left
+    stays bounded even if it only ever grew, it is scaled down to `MOST_KEPT` times the bound.
+
+    Args:
+        size: P.
+    """
+
+    def __init__(self, size: int) -> None:
+        self._count = max(round(TOP_SHARE * size), 1)
+        self._magnitudes = np.empty(size, np.float32)
+        # A prime stride: rows of weight matrices have rounder lengths, and each entry of a row its own scale.
+        self._stride = _prime_from(max(size // _SAMPLE, 1))
+
+    def take(self, vector: Tensor, largest: float) -> TopKGradient:
+        """See `Codec.take`."""
+        values = vector.numpy()
+        indices = self._largest(values)
+        chosen = torch.from_numpy(values[indices])
+        clip_norm(chosen, largest / _BF16_ROUNDS_UP)
+        halves = chosen.to(torch.bfloat16)
+        values[indices] -= halves.float().numpy()
+        clip_norm(vector, MOST_KEPT * largest)
+        return TopKGradient(values.size, indices.astype(np.uint32), _bits(halves))
+
+    def _largest(self, values: NDArray[np.float32]) -> NDArray[np.int64]:
+        """Return where the largest entries are, [k], ascending; the same for the same values."""
+        magnitudes = np.abs(values, out=self._magnitudes)
+        sample = np.sort(magnitudes[:: self._stride])
+        # As many candidates as are wanted, and some for the error of the guess. A guess that was too high is halved
+        # in rank: sorting all would take a second.
+        share = 1.25 * self._count / values.size
+        while True:
+            rank = sample.size - 1 - int(share * sample.size)
+            least = sample[rank] if rank > 0 else np.float32(0.0)
+            candidates = np.flatnonzero(magnitudes >= least)
+            if candidates.size >= self._count:
+                break
+            share *= 2.0
+        best = np.argpartition(magnitudes[candidates], -self._count)[-self._count :]
+        return np.sort(candidates[best])
+
+
+def clip_norm(vector: Tensor, largest: float) -> None:
+    """Scale a vector down in place if its Euclidean norm is above ``largest``."""
+    norm = float(torch.linalg.vector_norm(vector))
+    if norm > largest:
+        vector.mul_(largest / norm)
+
+
+def _bits(halves: Tensor) -> NDArray[np.uint16]:
+    return halves.view(torch.int16).numpy().view(np.uint16)
+
+
+def _prime_from(number: int) -> int:
+    """Return the least prime that is not below a number; 1 for 1."""
+    while any(number % divisor == 0 for divisor in range(2, int(number**0.5) + 1)):
+        number += 1
+    return number
