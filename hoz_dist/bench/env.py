@@ -13,8 +13,12 @@ import numpy as np
 from hoz_dist.bench.report import Metric
 from hoz_dist.bench.timing import Contender, Progress, rate, run_contests
 from hoz_dist.nav.actions import Action
+from hoz_dist.nav.encoder import VisualEncoder
+from hoz_dist.nav.rooms import RoomId
+from hoz_dist.policy.encoders.pooled import PooledEncoder
 from hoz_dist.sim.batch_env import BatchEnv
 from hoz_dist.sim.room_views import RoomViews
+from hoz_dist.sim.view_store import ViewStore
 
 TRAINING_BATCH: Final = 64
 """The default batch of a run; measured besides the one that is asked for."""
@@ -25,8 +29,9 @@ _STEPS: Final = 256
 
 
 def bench_env(
-    rooms: Sequence[RoomViews],
-    openers: Sequence[Callable[[], RoomViews]],
+    names: Sequence[RoomId],
+    cache: Path,
+    picture_size: int,
     *,
     batch: int,
     seconds: float,
@@ -36,26 +41,38 @@ def bench_env(
     """Measure steps per second in one thread, and how long a room takes to open.
 
     A step includes what the agent perceives: features, boxes and appearance of all categories, and the bag, copied
-    out. The limit is a plain copy of as many bytes out of a table of the same size.
+    out. The limit is a plain copy of as many bytes out of a table of the same size. The limit of opening is reading
+    the bytes of the room's arrays.
 
     Args:
-        rooms: Rooms to step in.
-        openers: Each opens a room that is in the view cache. The limit is reading the bytes of its arrays.
+        names: Rooms to step in, which are in the view cache.
+        cache: The view cache.
+        picture_size: Side of its pictures, pixels.
         batch: Episodes at once.
         seconds: Length of one measurement.
         repeats: Measurements of each figure.
         progress: Told how far the work is.
     """
-    sizes = dict.fromkeys((batch, TRAINING_BATCH))
+    encoder = PooledEncoder()
+    openers = [partial(_open, cache, picture_size, name, encoder) for name in names]
+    rooms = [opener() for opener in openers]
+    sizes = tuple(dict.fromkeys((batch, TRAINING_BATCH)))
     contests = [partial(_stepping, rooms, size, seconds) for size in sizes]
     samples = run_contests([*contests, partial(_opening, openers)], repeats, progress)
     steps = {
-        "env_steps_per_second" if size == batch else f"env_steps_per_second_b{size}": Metric.of(
-            samples[f"steps, batch {size}"], "steps/s", samples[f"plain copy, batch {size}"]
-        )
+        _name(size, batch): Metric.of(samples[f"steps, batch {size}"], "steps/s", samples[f"copies, batch {size}"])
         for size in sizes
     }
     return steps | {"room_open_ms": Metric.of(samples["open"], "ms", samples["read"])}
+
+
+def _name(size: int, batch: int) -> str:
+    return "env_steps_per_second" if size == batch else f"env_steps_per_second_b{size}"
+
+
+def _open(cache: Path, picture_size: int, name: RoomId, encoder: VisualEncoder) -> RoomViews:
+    """Open a room as a process does that has not opened it before."""
+    return ViewStore(cache, picture_size).open(name, encoder)
 
 
 @contextmanager
@@ -89,7 +106,7 @@ def _stepping(rooms: Sequence[RoomViews], batch: int, seconds: float) -> Iterato
 
     yield {
         f"steps, batch {batch}": lambda: rate(step, seconds) * _STEPS * batch,
-        f"plain copy, batch {batch}": lambda: rate(copy, seconds) * _STEPS * batch,
+        f"copies, batch {batch}": lambda: rate(copy, seconds) * _STEPS * batch,
     }
 
 

@@ -50,6 +50,7 @@ def bench_learner(
         repeats: Measurements of each figure.
         progress: Told how far the work is.
     """
+    torch.set_num_threads(1)
     cases = [(preset, codec) for preset in presets for codec in codecs]
     samples = run_contests([partial(_applying, *case, seconds) for case in cases], repeats, progress)
     metrics = {}

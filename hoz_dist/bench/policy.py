@@ -40,6 +40,7 @@ def bench_policy(
         repeats: Measurements of each figure.
         progress: Told how far the work is.
     """
+    torch.set_num_threads(1)
     contests: dict[str, Contest] = {}
     for preset in presets:
         for batch in ACTING_BATCHES:

@@ -10,7 +10,9 @@ import numpy as np
 from hoz_dist.bench.report import Metric
 from hoz_dist.bench.timing import Contender, Progress, rate, run_contests
 from hoz_dist.nav.pose import CAMERA_HEIGHT_M, FIELD_OF_VIEW_DEG, Pose
+from hoz_dist.nav.rooms import RoomId
 from hoz_dist.sim.bullet import pybullet
+from hoz_dist.sim.catalogue import load_room
 from hoz_dist.sim.painter import Painter
 from hoz_dist.sim.pose_graph import PoseGraph
 from hoz_dist.sim.room import Room
@@ -23,19 +25,20 @@ _FAR_M: Final = 20.0
 
 
 def bench_render(
-    room: Room, sizes: Sequence[int], *, seconds: float, repeats: int, progress: Progress
+    name: RoomId, sizes: Sequence[int], *, seconds: float, repeats: int, progress: Progress
 ) -> dict[str, Metric]:
     """Measure views per second in one thread: drawn, turned into arrays of metres and item numbers, and checked.
 
     The limit is PyBullet drawing the same views of the same room, with nothing done to what it returns.
 
     Args:
-        room: The room.
+        name: The room.
         sizes: Sides of the square pictures, pixels; each once.
         seconds: Length of one measurement.
         repeats: Measurements of each figure.
         progress: Told how far the work is.
     """
+    room = load_room(name)
     with Painter(room, sizes[0]) as painter:
         graph = painter.pose_graph()
     views = np.linspace(0, graph.views - 1, min(VIEWS, graph.views)).astype(int).tolist()

@@ -3,10 +3,12 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from hoz_dist.graph.scene_graph import SceneGraph
+from hoz_dist.graph.room_graph import RoomGraph
+from hoz_dist.graph.scene_graph import SceneGraph, merge_rooms
 from hoz_dist.nav.actions import NO_ACTION
 from hoz_dist.nav.categories import SCENES, TARGETS
 from hoz_dist.nav.observation import Observation
+from hoz_dist.nav.rooms import RoomId
 from hoz_dist.policy.graph_bank import GraphBank
 from hoz_dist.policy.settings import PolicySettings
 
@@ -33,18 +35,21 @@ def observations(settings: PolicySettings, *shape: int) -> Observation:
     )
 
 
-def scene_graph(scene: str, zones: int) -> SceneGraph:
-    """Make a scene graph of K zones."""
-    rng = np.random.default_rng(SCENES.index(scene))
+def room_graph(room: RoomId, digest: str, zones: int) -> RoomGraph:
+    """Make a graph of K zones of a room with some digest."""
+    rng = np.random.default_rng(SCENES.index(room.scene))
     edges = rng.uniform(0.01, 0.3, (zones, zones))
     edges = (edges + edges.T) / 2
     np.fill_diagonal(edges, 1.0)
-    return SceneGraph(scene, 1, (f"{scene}/1",), TARGETS, rng.random((zones, len(TARGETS))), edges)
+    return RoomGraph(str(room), digest, rng.random((zones, len(TARGETS))), edges)
 
 
 def graph_bank(zones: int) -> GraphBank:
     """Make the graphs of all scenes."""
-    return GraphBank.of({scene: scene_graph(scene, zones) for scene in SCENES}, zones, "product")
+    graphs: dict[str, SceneGraph] = {}
+    for scene in SCENES:
+        graphs[scene] = merge_rooms(scene, [room_graph(RoomId(scene, 1), "0", zones)], version=1)
+    return GraphBank.of(graphs, zones, "product")
 
 
 def gradient(size: int) -> NDArray[np.float32]:

@@ -41,6 +41,7 @@ COMMANDS: Final[dict[str, Entry]] = {
     "evaluate": Entry("hoz_dist.cli.evaluate:evaluate_command", "Measure a checkpoint on rooms it was not trained in."),
     "scenes": Entry("hoz_dist.cli.scenes:scenes_group", "List, show and render the rooms."),
     "graph": Entry("hoz_dist.cli.graph:graph_group", "Build, show, convert and plot graphs, and plan on them."),
+    "bench": Entry("hoz_dist.cli.bench:bench_group", "Measure how fast each part is, beside the machine's limits."),
     "doctor": Entry("hoz_dist.cli.doctor:doctor_command", "Check this machine, the view cache and the router."),
 }
 """The sub-commands, in the order of `hoz-dist --help`."""

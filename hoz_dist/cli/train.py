@@ -1,12 +1,12 @@
 """`hoz-dist train`: a learner and its actors on this machine, then the results."""
 
-import socket
 from pathlib import Path
 from typing import Any
 
 import click
 
 from hoz_dist.cli.options import cache_option, keep_every_option
+from hoz_dist.cli.ports import free_endpoint
 from hoz_dist.cli.run_options import as_arguments, run_config, run_options
 from hoz_dist.nav.categories import SCENES
 
@@ -70,15 +70,8 @@ def train_command(
 
     learner = as_arguments(choices | {"keep_every": keep_every})
 
-    launch(run, f"tcp/127.0.0.1:{_free_port()}", learner, actor, actors)
+    launch(run, free_endpoint(), learner, actor, actors)
 
     from hoz_dist.cli.report import report  # only now: it takes seconds to import
 
     report(run, episodes=episodes, seed=choices["seed"], weights=choices["weights"], cache=cache)
-
-
-def _free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port: int = probe.getsockname()[1]
-    return port

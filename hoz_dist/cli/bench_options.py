@@ -1,0 +1,118 @@
+"""Options that the benchmarks share, and how their results are printed."""
+
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, Final
+
+import click
+from click.core import ParameterSource
+
+from hoz_dist.cli.options import echo_json, json_option
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from hoz_dist.bench.report import Metric, Report
+
+_LEAST_REPEATS: Final = 5
+_PRESETS: Final = ("compact", "paper")
+_CODECS: Final = ("fp32",)
+
+repeats_option = click.option(
+    "--repeats",
+    type=click.IntRange(_LEAST_REPEATS, 1000),
+    default=_LEAST_REPEATS,
+    show_default=True,
+    help="Measurements of each figure, of which the median counts; what is compared takes turns.",
+)
+seconds_option = click.option(
+    "--seconds",
+    type=click.FloatRange(0.001, 600.0),
+    default=1.0,
+    show_default=True,
+    help="Length of one measurement, seconds; one that takes longer is made once.",
+)
+preset_option = click.option(
+    "--preset",
+    "presets",
+    type=click.Choice(_PRESETS),
+    multiple=True,
+    default=_PRESETS,
+    show_default="both",
+    help="Sizes of the network; may be repeated.",
+)
+compress_option = click.option(
+    "--compress",
+    "codecs",
+    type=click.Choice(_CODECS),
+    multiple=True,
+    default=_CODECS,
+    show_default="all",
+    help="How the gradient travels; may be repeated.",
+)
+Measure = Callable[..., "Mapping[str, Metric]"]
+
+
+def benchmark_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Give a command the options of every benchmark: ``--seconds``, ``--repeats`` and ``--json``."""
+    for option in (json_option, repeats_option, seconds_option):
+        command = option(command)
+    return command
+
+
+def show_metrics(metrics: "Mapping[str, Metric]", *, as_json: bool) -> None:
+    """Print what the benchmark that runs found, with the machine and the command."""
+    from rich.console import Console
+
+    from hoz_dist.bench.report import Report, this_machine
+
+    report = Report(metrics, this_machine(), command_line(click.get_current_context()))
+    if as_json:
+        echo_json(report.to_json())
+        return
+    console = Console()
+    console.print(_table(report))
+    console.print(", ".join(f"{name} {value}" for name, value in report.machine.items()), markup=False, highlight=False)
+
+
+def command_line(context: click.Context) -> str:
+    """Return the command that runs, with the options that were given, less ``--json``.
+
+    Files and endpoints are left to the reader: they are of this machine.
+    """
+    words = [context.command_path]
+    for option in context.command.params:
+        given = option.name and context.get_parameter_source(option.name) is ParameterSource.COMMANDLINE
+        if not given or not isinstance(option, click.Option) or option.name == "as_json":
+            continue
+        value = context.params[option.name or ""]
+        for single in value if isinstance(value, tuple) else (value,):
+            if option.is_flag:
+                words.append(option.opts[0] if single else option.secondary_opts[0])
+            elif isinstance(option.type, click.Path) or option.metavar == "ENDPOINT":
+                words += [option.opts[0], option.metavar or "PATH"]
+            else:
+                words += [option.opts[0], str(single)]
+    return " ".join(words)
+
+
+def _table(report: "Report") -> "Table":
+    from rich.table import Table
+
+    table = Table(title=report.command, title_justify="left")
+    table.add_column("figure")
+    for name in ("median", "least", "largest"):
+        table.add_column(name, justify="right")
+    table.add_column("unit")
+    table.add_column("limit", justify="right")
+    table.add_column("median / limit", justify="right")
+    for name, metric in report.metrics.items():
+        share = f"{metric.median / metric.limit:.3g}" if metric.limit else "-"
+        limit = "-" if metric.limit is None else _figure(metric.limit)
+        figures = map(_figure, (metric.median, metric.min, metric.max))
+        table.add_row(name, *figures, metric.unit, limit, share)
+    return table
+
+
+def _figure(value: float) -> str:
+    """Write a figure with at least three digits."""
+    return f"{value:,.0f}" if abs(value) >= 100 or value == int(value) else f"{value:.3g}"  # noqa: PLR2004

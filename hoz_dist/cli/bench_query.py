@@ -1,0 +1,106 @@
+"""`hoz-dist bench query`: how soon a learner answers, idle or while it trains."""
+
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+from typing import Final
+
+import click
+
+from hoz_dist.cli.bench_options import benchmark_options, show_metrics
+from hoz_dist.cli.options import cache_option
+from hoz_dist.cli.ports import free_endpoint
+
+START_S: Final = 300.0
+"""How long a training may take to come into full swing, the rendering of its room included, seconds."""
+_ROOM: Final = "kitchen/1"
+"""The only room of a training: more would only make it start later."""
+
+
+@click.command("query")
+@click.option(
+    "--training",
+    is_flag=True,
+    help="Ask a learner that trains; with --connect, one that does.  [default: one that is idle]",
+)
+@click.option(
+    "--actors", type=click.IntRange(1, 64), default=2, show_default=True, help="Actors of the training, processes."
+)
+@click.option(
+    "--connect", metavar="ENDPOINT", help="Ask the learner that runs there.  [default: one started for the benchmark]"
+)
+@click.option(
+    "--clients", type=click.IntRange(1, 256), default=4, show_default=True, help="Clients that ask at once, threads."
+)
+@cache_option
+@benchmark_options
+def query_command(
+    actors: int,
+    connect: str | None,
+    clients: int,
+    cache: Path | None,
+    seconds: float,
+    repeats: int,
+    *,
+    training: bool,
+    as_json: bool,
+) -> None:
+    """Measure how soon a scene graph comes when asked for, and how many of them in a second.
+
+    The limit: as many bytes by Zenoh alone, from a process that does nothing else, asked in turns with the learner. The
+    training is of the compact size, with all its processes on this machine.
+    """
+    from hoz_dist.bench.bare import answer_bare
+    from hoz_dist.bench.query import bench_query, graph_bytes, scene_with_graph
+    from hoz_dist.cli.apart import companion, work_apart
+
+    with _learner(connect, actors if training else 0, cache) as endpoint:
+        scene, bare = scene_with_graph(endpoint), free_endpoint()
+        with companion(partial(answer_bare, bare, graph_bytes(scene, endpoint))):
+            work = partial(
+                bench_query,
+                endpoint,
+                bare,
+                scene,
+                "training" if training else "idle",
+                clients=clients,
+                seconds=seconds,
+                repeats=repeats,
+            )
+            metrics = work_apart("Measuring", work)
+    show_metrics(metrics, as_json=as_json)
+
+
+@contextmanager
+def _learner(connect: str | None, actors: int, cache: Path | None) -> Iterator[str]:
+    """Give the endpoint of a learner that has a scene graph, and trains if it has actors."""
+    if connect is not None:
+        yield connect
+        return
+
+    from hoz_dist.bench.query import FULL_SWING, await_version, give_graph
+    from hoz_dist.cli.processes import Children
+    from hoz_dist.cli.progress import Progress
+    from hoz_dist.cli.run_options import as_arguments
+    from hoz_dist.nav.rooms import RoomId
+
+    endpoint = free_endpoint()
+    with tempfile.TemporaryDirectory(prefix="hoz-dist-") as logs, Children() as children:
+        folder = Path(logs)
+        children.start("learner", ["learner", "--listen", endpoint, "--run", str(folder / "bench")], folder / "learner")
+        options = ["--connect", endpoint, *as_arguments({"scene": _ROOM, "cache": cache})]
+        for number in range(actors):
+            name = f"actor-{number}"
+            children.start(name, ["actor", "--name", name, *options], folder / name)
+        with Progress("Waiting for the learner", 1.0, None) as progress:
+            await_version(
+                endpoint,
+                FULL_SWING if actors else 0,
+                START_S,
+                lambda done, total, note: progress.update(done, note, total=total),
+            )
+        if not actors:
+            give_graph(endpoint, RoomId.parse(_ROOM))
+        yield endpoint
