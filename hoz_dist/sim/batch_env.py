@@ -1,5 +1,6 @@
 """B training episodes at once over several rooms, with autoreset."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -27,6 +28,15 @@ class Step(NamedTuple):
     """Whether the action was taken, [B]; False where the step only reset."""
     finished: list[EpisodeResult]
     """The episodes that ended in this step, in the order of their slots."""
+
+
+class Places(NamedTuple):
+    """Where B agents are; with the contents of the rooms all that an observation is a function of."""
+
+    room: NDArray[np.int64]
+    """Number of each slot's room, in the order of `BatchEnv.rooms`, [B]."""
+    view: NDArray[np.int64]
+    """View within the room, [B]."""
 
 
 class BatchEnv:
@@ -65,6 +75,20 @@ class BatchEnv:
     def views(self) -> NDArray[np.int64]:
         """View of each slot over all rooms, [B]; changes with the next step."""
         return self._episodes.views
+
+    @property
+    def rooms(self) -> Sequence[RoomViews]:
+        """The rooms, in the order in which they were added."""
+        return self._episodes.rooms
+
+    def places(self) -> Places:
+        """Return where each slot's agent is: what `observe` shows is seen from there.
+
+        Raises:
+            InvalidValueError: There are no rooms yet.
+        """
+        self._ensure_started()
+        return Places(self._episodes.room_numbers.copy(), self._episodes.local_views())
 
     def add_room(self, views: RoomViews) -> None:
         """Let new episodes also come from a room.

@@ -39,12 +39,14 @@ class EpisodeBatch:
         """
         self.views = np.zeros(batch, dtype=np.int64)
         """View of each slot over all rooms, [B]."""
+        self.room_numbers = np.zeros(batch, dtype=np.int64)
+        """Number of the room of each slot, [B]."""
         self._source: ViewSource = StoredViews() if source is None else source
         self._max_actions = max_actions
         self._transitions: RowTable[np.int64] = RowTable()
-        self._rooms: list[RoomViews] = []
+        self.rooms: list[RoomViews] = []
+        """The rooms, in the order of `add_room`."""
         self._room_starts: list[int] = []
-        self._room_numbers = np.zeros(batch, dtype=np.int64)
         self._target = np.zeros(batch, dtype=np.int64)
         self._scene = np.zeros(batch, dtype=np.int64)
         self._optimal = np.zeros(batch, dtype=np.int64)
@@ -58,15 +60,15 @@ class EpisodeBatch:
         offset = len(self._transitions)
         self._transitions.append(views.graph.transitions.astype(np.int64) + offset)
         self._source.add_room(views)
-        self._rooms.append(views)
+        self.rooms.append(views)
         self._room_starts.append(offset)
-        return len(self._rooms) - 1
+        return len(self.rooms) - 1
 
     def start(self, slot: int, room_number: int, episode: Episode) -> None:
         """Put an episode into a slot."""
         scene = episode.room.scene
         self.views[slot] = self._room_starts[room_number] + episode.start
-        self._room_numbers[slot] = room_number
+        self.room_numbers[slot] = room_number
         self._target[slot] = episode.target
         self._scene[slot] = scene_index(scene)
         self._optimal[slot] = episode.optimal
@@ -110,7 +112,7 @@ class EpisodeBatch:
         """Sum up the episode of a slot that has just ended."""
         said_done = bool(outcome.terminated[slot])
         return EpisodeResult(
-            room=self._rooms[self._room_numbers[slot]].room,
+            room=self.rooms[self.room_numbers[slot]].room,
             target=int(self._target[slot]),
             success=said_done and bool(outcome.reward[slot] > 0),
             actions=int(self._actions[slot]),
@@ -121,4 +123,4 @@ class EpisodeBatch:
 
     def local_views(self) -> NDArray[np.int64]:
         """Return the view of each slot within its own room, [B]."""
-        return self.views - np.asarray(self._room_starts, dtype=np.int64)[self._room_numbers]
+        return self.views - np.asarray(self._room_starts, dtype=np.int64)[self.room_numbers]
