@@ -28,9 +28,10 @@ from safetensors.numpy import load, save_file
 from hoz_dist.atomic import replace_file
 from hoz_dist.config import RunConfig
 from hoz_dist.errors import DamagedFileError, HozError, InvalidValueError, NotFoundError
+from hoz_dist.gradient_forms import Vector
 from hoz_dist.graph.room_graph import RoomGraph
 from hoz_dist.graph.scene_graph import SceneGraph, merge_rooms
-from learner.optimizer import AdamState, Vector
+from learner.optimizer import AdamState
 
 FORMAT: Final = 1
 """Version of the format; a file of another version is refused by name."""

@@ -11,11 +11,14 @@ the parameters went on since the version that it was computed on.
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final
 
+from hoz_dist.a3c.compression.decompressor import Decompressor
 from hoz_dist.config import RunConfig
 from hoz_dist.errors import InvalidValueError
+from hoz_dist.gradient_forms import Vector
 from hoz_dist.graph.room_graph import RoomGraph
 from hoz_dist.nav.categories import TARGETS
 from hoz_dist.wire.protocol.answers import Accepted, Busy, Refused
+from hoz_dist.wire.protocol.gradients import codec_of
 from hoz_dist.wire.protocol.pushes import GradientPush, RoomGraphPush
 from hoz_dist.wire.protocol.rejection import Reason, RejectedError
 from learner.checkpoint import Checkpoint
@@ -36,7 +39,7 @@ from learner.events import (
     Tick,
 )
 from learner.graph_store import GraphStore
-from learner.optimizer import NORM_TOLERANCE, FlatAdam, Vector, gradient_norm, lag_weight
+from learner.optimizer import NORM_TOLERANCE, FlatAdam, gradient_norm, lag_weight
 from learner.replay import Schedule, UpdateRecord
 from learner.statistics import Statistics
 
@@ -84,6 +87,7 @@ class LearnerCore:
         self.version = 0
         self.finished = False
         self._optimizer = FlatAdam(parameters, config.learning_rate)
+        self._decompressor = Decompressor(self._optimizer.size)
         self.graphs = GraphStore(config.zones, room_digests or {})
         self.statistics = Statistics()
         self._seen = SeenPushes()
@@ -197,21 +201,26 @@ class LearnerCore:
         if refusal is not None:
             yield self._refuse(request, *refusal)
             return
+        vector = self._decompressor.vector(push.gradient)
+        norm, bound = gradient_norm(vector), self.config.gradient_norm
+        # Actors scale their gradients down; what exceeds the bound by more than rounding is not one of theirs.
+        if norm > bound * (1.0 + NORM_TOLERANCE):
+            yield self._refuse(request, Reason.NORM, f"norm {norm:.6g}, the bound is {bound:g}")
+            return
         if self._schedule is not None and self._schedule.turn(push.actor, push.sequence) == "later":
             yield Reply(request, Busy(self.epoch))
             return
-        yield from self._apply(sender, push, now)
+        yield from self._apply(sender, push, vector, now)
         yield PublishParameters()
         yield Reply(request, self._accepted())
 
     def _refusal(self, push: GradientPush) -> tuple[Reason, str] | None:
-        """Return why a gradient cannot be used, as reason and detail; None when it can.
+        """Return why a gradient cannot be used, as reason and detail; None when it can, unless it is too long.
 
         Its entries are finite: a message with others cannot be made.
         """
         lag, size = self.version - push.version, self._optimizer.size
-        bound = self.config.gradient_norm
-        norm = gradient_norm(push.gradient) if push.gradient.size == size else 0.0  # refused by its size
+        codec, wanted = codec_of(push.gradient), self.config.compress
         most_frames = self.config.batch * self.config.rollout_steps
         schedule = self._schedule
         stranger = schedule is not None and push.actor not in schedule.actors
@@ -228,20 +237,19 @@ class LearnerCore:
             (lag < 0, Reason.STALE, f"computed on version {push.version}, the newest is {self.version}"),
             (lag > self.config.max_lag, Reason.STALE, f"{lag} versions behind, the bound is {self.config.max_lag}"),
             (push.gradient.size != size, Reason.SHAPE, f"{push.gradient.size} entries for {size} parameters"),
-            # Actors scale their gradients down; what exceeds the bound by more than rounding is not one of theirs.
-            (norm > bound * (1.0 + NORM_TOLERANCE), Reason.NORM, f"norm {norm:.6g}, the bound is {bound:g}"),
+            (codec != wanted, Reason.CODEC, f"the gradient travels as {codec}; the run's do as {wanted}"),
             (push.frames > most_frames, Reason.RANGE, f"{push.frames} frames; a rollout has at most {most_frames}"),
             (unknown, Reason.STALE, f"sequence {push.sequence} was not applied in the recorded run"),
         )
         return next(((reason, detail) for wrong, reason, detail in checks if wrong), None)
 
-    def _apply(self, sender: Sender, push: GradientPush, now: float) -> Iterator[Effect]:
+    def _apply(self, sender: Sender, push: GradientPush, vector: Vector, now: float) -> Iterator[Effect]:
         lag = self.version - push.version
         self._clock.push(now)
         self._optimizer.set_progress(self.progress(now) or 0.0)
         if self._schedule is not None:
             self._optimizer.learning_rate = self._schedule.take(push.version)
-        self._optimizer.step(push.gradient, lag_weight(lag))
+        self._optimizer.step(vector, lag_weight(lag))
         self._seen.add(sender, push.sequence)
         self.version += 1
         self.statistics.applied(push.actor, push.incarnation, push.frames, lag, now)

@@ -4,10 +4,9 @@ from typing import Final, NamedTuple
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
-Vector = NDArray[np.float32]
-"""All parameters of a policy, or as many gradients or moments, in one vector, float32 [P]."""
+from hoz_dist.a3c.compression.borrowing import borrowed
+from hoz_dist.gradient_forms import Vector
 
 BETAS: Final = (0.9, 0.999)
 EPSILON: Final = 1e-8
@@ -62,9 +61,8 @@ class FlatAdam:
         self.learning_rate = learning_rate
         # The NumPy arrays and the tensors are two views of the same memory.
         self._parameters = np.array(parameters, dtype=np.float32)
-        self._gradient = np.zeros_like(self._parameters)
         self._tensor = torch.from_numpy(self._parameters)
-        self._tensor.grad = torch.from_numpy(self._gradient)
+        self._weighted = torch.zeros_like(self._tensor)
         self._adam = torch.optim.Adam([self._tensor], lr=learning_rate, betas=BETAS, eps=EPSILON, fused=True)
 
     @property
@@ -90,9 +88,12 @@ class FlatAdam:
             gradient: [P], finite; left as it is, and may be read-only (the bytes of a message).
             weight: Its factor, see `lag_weight`.
         """
-        np.multiply(gradient, np.float32(weight), out=self._gradient)
+        received = borrowed(gradient)
+        # A gradient of full weight is read where it is: the step writes into it only when told to scale it.
+        self._tensor.grad = received if weight == 1.0 else torch.mul(received, weight, out=self._weighted)
         self._adam.param_groups[0]["lr"] = self.learning_rate
         self._adam.step()
+        self._tensor.grad = None  # lets go of the message that it may be in
 
     def state(self) -> AdamState:
         """Return a copy of the moments."""

@@ -11,6 +11,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from hoz_dist.a3c.compression.compressor import Compressor
 from hoz_dist.closing import Closing
 from hoz_dist.config import RunConfig
 from hoz_dist.errors import ConnectionFailedError, HozError, InvalidValueError, NotFoundError
@@ -100,6 +101,8 @@ class LearnerLink(Closing):
         self._incarnation = secrets.randbits(48)
         self._sequences: Counter[type[Push]] = Counter()
         noted = journal.write if journal is not None else None
+        self._compressor: Compressor | None = None
+        """Made for the first gradient, which says how many entries they have."""
         self._pusher = Pusher(session, stop, epochs=self._epochs, acknowledged=noted, memory=memory, clock=clock)
         with ExitStack() as stack:
             stack.enter_context(
@@ -163,13 +166,15 @@ class LearnerLink(Closing):
     def push_gradient(
         self, gradient: NDArray[np.float32], frames: int, computed_on: tuple[int, int]
     ) -> Accepted | Refused:
-        """Push a gradient.
+        """Push a gradient in the form of the run's codec.
 
         Args:
             gradient: [P].
             frames: Environment frames that it was computed from.
             computed_on: Epoch and version of the parameters that it was computed on.
         """
+        if self._compressor is None:
+            self._compressor = Compressor(self.config.compress, gradient.size, self.config.gradient_norm)
         epoch, version = computed_on
         push = GradientPush(
             actor=self._actor,
@@ -178,9 +183,12 @@ class LearnerLink(Closing):
             epoch=epoch,
             version=version,
             frames=frames,
-            gradient=gradient,
+            gradient=self._compressor.compress(gradient),
         )
-        return self._pusher.push(self._keys.grads(self._actor), push)
+        reply = self._pusher.push(self._keys.grads(self._actor), push)
+        if isinstance(reply, Accepted):
+            self._compressor.accepted()
+        return reply
 
     def push_episodes(self, episodes: Sequence[EpisodeResult], losses: Mapping[str, float]) -> Accepted | Refused:
         """Push how episodes ended and how the training goes; more than a message holds go in several.
