@@ -1,4 +1,4 @@
-"""Rolls the policy out in a batch of episodes and computes the gradient of the rollout."""
+"""Rolls the policy out in a batch of episodes; makes gradients of the rollouts, or messages."""
 
 from collections.abc import Iterable
 from typing import NamedTuple
@@ -20,18 +20,30 @@ from hoz_dist.policy.actor_critic import ActorCritic, State
 from hoz_dist.policy.graph_bank import GraphBank
 from hoz_dist.policy.navigator import Guidance
 from hoz_dist.policy.parameters import FlatParameters, make_policy
+from hoz_dist.policy.recurrent import Tape
 from hoz_dist.policy.sampling import sample_actions
 from hoz_dist.sim.batch_env import BatchEnv
 from hoz_dist.stages import StageClock
+from hoz_dist.wire.protocol.trajectories import RoomUsed, Steps
+from workers.recording import Acted, Seen, steps_of
 
 
 class Update(NamedTuple):
-    """What came of one rollout."""
+    """What came of one rollout, to be pushed as a gradient."""
 
     gradient: NDArray[np.float32]
     """Gradient of the loss by the flat parameters, clipped, [P]; valid until the next call."""
     frames: int
     loss: Loss
+    finished: list[EpisodeResult]
+
+
+class Trajectory(NamedTuple):
+    """One rollout, to be pushed as it was acted."""
+
+    steps: Steps
+    rooms: tuple[RoomUsed, ...]
+    """The rooms that the steps count."""
     finished: list[EpisodeResult]
 
 
@@ -58,6 +70,7 @@ class Collector:
         self._policy: ActorCritic = make_policy(config.policy, config.seed)
         self.parameters = FlatParameters(self._policy)
         self._differentiator = Differentiator(config, self._policy, self.parameters)
+        self._tape = self._policy.tape(config.rollout_steps, config.batch)
         self._bank = GraphBank(config.zones, config.edge_cost)
         self._state: State = self._policy.initial_state(config.batch)
 
@@ -82,34 +95,52 @@ class Collector:
             InvalidValueError: The environment has no rooms.
         """
         start = self._state
-        observations, decisions, actions, steps = [], [], [], []
-        finished: list[EpisodeResult] = []
-        for _ in range(self._config.rollout_steps):
-            observation = self._env.observe()
-            decision = self._policy.act(observation, self._state, self._bank)
-            chosen = sample_actions(decision.logits, self._rng)
-            step = self._env.step(chosen.numpy())
-            observations.append(observation)
-            decisions.append(decision)
-            actions.append(chosen)
-            steps.append(step)
-            finished += step.finished
-            self._state = decision.state
-        bootstrap = self._policy.act(self._env.observe(), self._state, self._bank).value
+        acted, after = self._act()
         rollout = Rollout(
-            actions=torch.stack(actions),
-            rewards=_stack(step.reward for step in steps),
-            terminated=_stack(step.terminated for step in steps),
-            truncated=_stack(step.truncated for step in steps),
-            valid=_stack(step.valid for step in steps),
-            values=torch.stack([decision.value for decision in decisions]),
-            bootstrap=bootstrap,
+            actions=torch.stack([moment.actions for moment in acted]),
+            rewards=_stack(moment.step.reward for moment in acted),
+            terminated=_stack(moment.step.terminated for moment in acted),
+            truncated=_stack(moment.step.truncated for moment in acted),
+            valid=_stack(moment.step.valid for moment in acted),
+            values=torch.stack([moment.decision.value for moment in acted]),
+            bootstrap=after.decision.value,
         )
-        observation = Observation(*map(np.stack, zip(*observations, strict=True)))
-        guidance = Guidance(*map(torch.stack, zip(*(decision.guidance for decision in decisions), strict=True)))
+        observation = Observation(*map(np.stack, zip(*(moment.observation for moment in acted), strict=True)))
+        guidance = Guidance(*map(torch.stack, zip(*(moment.decision.guidance for moment in acted), strict=True)))
         with self._clock("differentiate"):
-            loss = self._differentiator.on_policy(rollout, observation, guidance, start, self._bank)
-        return Update(self.parameters.gradients.numpy(), rollout.frames, loss, finished)
+            loss = self._differentiator.on_policy(rollout, observation, guidance, start, self._bank, self._tape)
+        return Update(self.parameters.gradients.numpy(), rollout.frames, loss, _finished(acted))
+
+    def record(self) -> Trajectory:
+        """Run T steps in every episode, for somebody else to learn from.
+
+        Raises:
+            InvalidValueError: The environment has no rooms.
+        """
+        acted, after = self._act()
+        steps, rooms = steps_of(acted, after, self._env.rooms)
+        return Trajectory(steps, rooms, _finished(acted))
+
+    def _act(self) -> tuple[list[Acted], Seen]:
+        """Run T steps in every episode; return them, and what is seen after the last."""
+        acted = []
+        self._tape.rewind()
+        for _ in range(self._config.rollout_steps):
+            seen = self._look(self._tape)
+            actions = sample_actions(seen.decision.logits, self._rng)
+            acted.append(Acted(*seen, actions, self._env.step(actions.numpy())))
+            self._state = seen.decision.state
+        return acted, self._look()
+
+    def _look(self, tape: Tape | None = None) -> Seen:
+        """Perceive the next step."""
+        observation = self._env.observe()
+        decision = self._policy.act(observation, self._state, self._bank, tape)
+        return Seen(observation, self._env.places(), decision)
+
+
+def _finished(acted: Iterable[Acted]) -> list[EpisodeResult]:
+    return [result for moment in acted for result in moment.step.finished]
 
 
 def _stack(arrays: Iterable[NDArray[np.generic]]) -> Tensor:

@@ -31,7 +31,7 @@ def make(config: RunConfig = CONFIG) -> Collector:
     features = rng.random((views.graph.views, config.channels, 7, 7)).astype(np.float16)
     appearance = rng.random((views.graph.views, len(TARGETS), config.channels)).astype(np.float16)
     env = BatchEnv(config.batch, rng, max_actions=10)
-    env.add_room(dataclasses.replace(views, features=features, appearance=appearance))
+    env.add_room(dataclasses.replace(views, digest="d1", features=features, appearance=appearance))
     collector = Collector(config, env, rng)
     collector.use_graph(scene_graph("kitchen", 0))
     return collector
