@@ -6,6 +6,7 @@ import torch
 from torch import Tensor
 
 from hoz_dist.a3c.loss import Loss, LossWeights, a3c_loss
+from hoz_dist.a3c.norm import clip_norm
 from hoz_dist.a3c.rollout import Rollout
 from hoz_dist.config import RunConfig
 from hoz_dist.nav.observation import Observation
@@ -121,10 +122,3 @@ class Differentiator:
 def _split(steps: int) -> tuple[slice, slice]:
     """Return the rows of the steps, and of what follows them."""
     return slice(steps), slice(steps, steps + 1)
-
-
-def clip_norm(gradient: Tensor, largest: float) -> None:
-    """Scale a gradient down in place if its Euclidean norm is above ``largest``."""
-    norm = float(gradient.norm())
-    if norm > largest:
-        gradient.mul_(largest / norm)

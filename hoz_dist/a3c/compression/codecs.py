@@ -14,6 +14,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from hoz_dist.a3c.norm import clip_norm
 from hoz_dist.gradient_forms import INT8_BLOCK, Bf16Gradient, Gradient, Int8Gradient, TopKGradient, blocks_of
 
 TOP_SHARE: Final = 0.01
@@ -142,13 +143,6 @@ class TopK:
             share *= 2.0
         best = np.argpartition(magnitudes[candidates], -self._count)[-self._count :]
         return np.sort(candidates[best])
-
-
-def clip_norm(vector: Tensor, largest: float) -> None:
-    """Scale a vector down in place if its Euclidean norm is above ``largest``."""
-    norm = float(torch.linalg.vector_norm(vector))
-    if norm > largest:
-        vector.mul_(largest / norm)
 
 
 def _bits(halves: Tensor) -> NDArray[np.uint16]:

@@ -5,7 +5,8 @@ from dataclasses import replace
 import pytest
 import torch
 
-from hoz_dist.a3c.differentiation import Behaviour, Differentiator, clip_norm
+from hoz_dist.a3c.differentiation import Behaviour, Differentiator
+from hoz_dist.a3c.norm import clip_norm
 from hoz_dist.a3c.rollout import Rollout
 from hoz_dist.config import RunConfig
 from hoz_dist.nav.observation import Observation
