@@ -42,6 +42,7 @@ COMMANDS: Final[dict[str, Entry]] = {
     "scenes": Entry("hoz_dist.cli.scenes:scenes_group", "List, show and render the rooms."),
     "graph": Entry("hoz_dist.cli.graph:graph_group", "Build, show, convert and plot graphs, and plan on them."),
     "bench": Entry("hoz_dist.cli.bench:bench_group", "Measure how fast each part is, beside the machine's limits."),
+    "simulate": Entry("hoz_dist.cli.simulate:simulate_command", "Predict the speed of a run on more machines."),
     "doctor": Entry("hoz_dist.cli.doctor:doctor_command", "Check this machine, the view cache and the router."),
 }
 """The sub-commands, in the order of `hoz-dist --help`."""

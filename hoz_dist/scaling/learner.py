@@ -1,0 +1,49 @@
+"""The learner: applies what is pushed, if it is not too stale."""
+
+from collections.abc import Generator
+from typing import Any
+
+import simpy
+
+from hoz_dist.scaling.costs import Costs
+from hoz_dist.scaling.node import Answer, Counted, Node, Place, Push
+
+
+class Learner(Node):
+    """One learner; of several that share the parameters, one that stands for all: they do the same at the same time.
+
+    Args:
+        place: Where it runs.
+        costs: What its stages take.
+        clients: How many processes are told of new parameters.
+        counted: Where to count.
+        max_lag: Largest policy lag at which a gradient is applied, versions.
+    """
+
+    def __init__(self, place: Place, costs: Costs, *, clients: int, counted: Counted, max_lag: int) -> None:
+        super().__init__(place, costs, clients=clients, counted=counted)
+        self._max_lag = max_lag
+
+    def begin(self, reader: object) -> int | None:
+        """Begin to read the newest version; None when no more can be kept."""
+        version = super().begin(reader)
+        self.counted.fetched += version is not None
+        return version
+
+    def handle(self, push: Push) -> Generator[simpy.Event, Any, Answer]:
+        """Refuse a push that is stale; apply the others, and publish the parameters."""
+        counted, lag = self.counted, self.version - push.version
+        if lag > self._max_lag:
+            yield from self._compute(self.costs.fixed)
+            counted.stale += push.count
+            return Answer("stale", self.version)
+        yield from self._compute(self.costs.apply + self.costs.record)
+        yield from self._publish()
+        self.version += 1
+        counted.updates += 1
+        counted.frames += push.frames
+        counted.applied += push.count
+        counted.lags += push.count * lag
+        counted.ages += push.count * (self.env.now - push.made_at)
+        counted.lag_max = max(counted.lag_max, lag)
+        return Answer("accepted", self.version)

@@ -1,0 +1,141 @@
+"""The model where one can tell by hand what comes of it."""
+
+import pytest
+
+from hoz_dist.errors import InvalidValueError
+from hoz_dist.scaling.model import simulate
+from hoz_dist.scaling.setting import Prediction
+from tests.unit.scaling.making import costs, setting
+
+ALL = {
+    "act": 0.5,
+    "differentiate": 0.25,
+    "load": 0.01,
+    "push": 0.02,
+    "fetch": 0.03,
+    "actor_wire": 0.04,
+    "receive": 0.05,
+    "apply": 0.06,
+    "publish": 0.07,
+    "serve": 0.08,
+    "record": 0.01,
+    "learner_wire": 0.08,
+}
+
+
+def test_one_actor_alone_takes_the_sum_of_all_costs_and_delays() -> None:
+    found = simulate(costs(**ALL, round_trips=3, exchange=0.1), setting(latency=0.05))
+    # Four questions: a push and three fetches.
+    assert 1.0 / found.updates_per_second == pytest.approx(sum(ALL.values()) + 4 * (0.1 + 2 * 0.05))
+    assert found.frames_per_second == pytest.approx(100 * found.updates_per_second)
+    assert (found.lag, found.stale, found.busy, found.resent) == (0.0, 0.0, 0.0, 0.0)
+
+
+def test_the_interpreter_lock_alone_does_not_slow_one_actor_down() -> None:
+    assert simulate(costs(**ALL, gil=1.0), setting()).updates_per_second == pytest.approx(
+        simulate(costs(**ALL), setting()).updates_per_second
+    )
+
+
+def test_actors_that_share_a_core_share_its_time() -> None:
+    found = simulate(costs(act=0.5), setting(actors=3, one_host=True, cores=1))
+    assert found.updates_per_second == pytest.approx(2.0, rel=0.02)
+    assert found.host_load == pytest.approx(1.0)
+    assert found.bottleneck == "actor"
+
+
+def test_crowded_cores_are_slower_and_a_core_alone_is_not() -> None:
+    crowded = costs(act=0.5, crowding=0.25)
+    assert simulate(crowded, setting(one_host=True, cores=2)).updates_per_second == pytest.approx(2.0)
+    found = simulate(crowded, setting(actors=2, one_host=True, cores=2))
+    assert found.updates_per_second == pytest.approx(2 * 2.0 / 1.25, rel=0.02)
+
+
+def test_a_learner_applies_no_more_than_its_thread_can() -> None:
+    found = simulate(costs(act=1.0, apply=0.03, publish=0.02), setting(actors=100))
+    assert found.updates_per_second == pytest.approx(1 / 0.05, rel=0.02)
+    assert found.apply_load == pytest.approx(1.0, abs=0.01)
+    assert found.bottleneck == "apply"
+
+
+@pytest.mark.parametrize(("gil", "updates"), [(0.0, 1 / 0.05), (1.0, 1 / 0.09)])
+def test_the_interpreter_lock_makes_the_learners_threads_take_turns(gil: float, updates: float) -> None:
+    found = simulate(costs(act=0.5, receive=0.04, apply=0.05, gil=gil), setting(actors=30))
+    assert found.updates_per_second == pytest.approx(updates, rel=0.05)
+
+
+def test_a_full_link_carries_what_its_bandwidth_allows() -> None:
+    # 4000 bytes a gradient are 32,000 bits; parameters come the other way.
+    found = simulate(costs(act=0.01), setting(actors=50, bandwidth=1e6))
+    assert found.updates_per_second == pytest.approx(1e6 / 32_000, rel=0.03)
+    assert found.megabits_up == pytest.approx(1.0, rel=0.03)
+    assert found.bottleneck in {"up", "down"}
+
+
+def test_fewer_bytes_go_over_the_same_link_more_often() -> None:
+    measured = costs(act=0.01)
+    few = measured.adapted(compress="int8", parameters_form="delta")
+    full = simulate(measured, setting(actors=50, bandwidth=1e6)).updates_per_second
+    assert simulate(few, setting(actors=50, bandwidth=1e6)).updates_per_second == pytest.approx(4 * full, rel=0.05)
+
+
+def test_the_inbox_is_bounded_and_the_others_are_told_to_come_again() -> None:
+    one = simulate(costs(act=0.1, apply=0.1), setting(actors=30))
+    many = simulate(costs(act=0.1, apply=0.1), setting(actors=100))
+    assert one.busy == 0.0
+    assert many.busy > 0.5
+    assert many.updates_per_second == pytest.approx(10.0, rel=0.02)
+
+
+def test_the_lag_is_the_number_of_the_other_actors() -> None:
+    lags = [simulate(costs(act=1.0, apply=0.001), setting(actors=actors)).lag for actors in (1, 5, 20)]
+    assert lags == pytest.approx([0, 4, 19], abs=0.5)
+
+
+def test_gradients_that_are_too_stale_are_refused() -> None:
+    found = simulate(costs(act=1.0, apply=0.001), setting(actors=40, max_lag=9))
+    assert found.stale == pytest.approx(0.75, abs=0.03)
+    assert found.lag_max <= 9
+
+
+def test_shards_divide_what_depends_on_the_size() -> None:
+    slow = costs(act=0.1, apply=0.1, fixed=0.002)
+    found = simulate(slow, setting(actors=100, shards=10))
+    assert found.updates_per_second == pytest.approx(1 / (0.002 + 0.098 / 10), rel=0.03)
+
+
+def test_a_relay_spares_the_learner_its_actors() -> None:
+    slow = costs(act=1.0, apply=0.05)
+    alone = simulate(slow, setting(actors=100))
+    helped = simulate(slow, setting(actors=100, relays=10))
+    assert alone.updates_per_second == pytest.approx(1 / 0.05, rel=0.02)
+    assert helped.frames_per_second == pytest.approx(100 * 100 / 1.0, rel=0.1)
+    assert helped.lag < alone.lag
+
+
+def test_one_seed_gives_one_result() -> None:
+    crowd, slow = setting(actors=60), costs(act=0.2, apply=0.05)
+    once = simulate(slow, crowd, seed=3)
+    assert simulate(slow, crowd, seed=3) == once
+    assert simulate(slow, crowd, seed=4) != once
+
+
+def test_progress_ends_with_all() -> None:
+    told: list[float] = []
+    simulate(costs(act=1.0), setting(actors=3), progress=told.append)
+    assert told == sorted(told)
+    assert told[-1] == 1.0
+
+
+def test_rollouts_have_neither_shards_nor_relays() -> None:
+    rollouts = costs(act=1.0).adapted(learn_from="rollouts")
+    for design in ({"shards": 2}, {"relays": 1}):
+        with pytest.raises(InvalidValueError, match="need gradients"):
+            simulate(rollouts, setting(actors=4, **design))
+
+
+def test_what_is_fullest_is_named_and_nothing_when_all_wait() -> None:
+    assert simulate(costs(act=1.0), setting()).bottleneck == "actor"
+    found: Prediction = simulate(costs(act=1.0), setting(latency=5.0))
+    assert found.bottleneck == "waiting"
+    assert found.to_json()["bottleneck"] == "waiting"
