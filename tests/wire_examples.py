@@ -7,13 +7,14 @@ from hoz_dist.nav.rooms import RoomId
 from hoz_dist.wire.protocol.answers import Accepted, Busy, Refused
 from hoz_dist.wire.protocol.graph_messages import PlanReply, RoomGraphReply, SceneGraphReply
 from hoz_dist.wire.protocol.message import Message
-from hoz_dist.wire.protocol.parameters import ParametersHead, ParametersShard, head_of
+from hoz_dist.wire.protocol.parameters import ParametersDelta, ParametersHead, ParametersShard, digest_of
 from hoz_dist.wire.protocol.pushes import EpisodesPush, GradientPush, RoomGraphPush
 from hoz_dist.wire.protocol.run_messages import ConfigReply, LeftProcess, ProcessStatus, StatusReply
 from hoz_dist.wire.protocol.trajectories import Flag, GraphUsed, RoomUsed, Steps, TrajectoryPush
 
 VECTOR = np.array([0.5, -0.25], np.float32)
-HEAD: ParametersHead = head_of(2, 6, VECTOR)
+HEAD = ParametersHead(2, 6, VECTOR.size)
+BASE = np.array([0.5, 0.0], np.float32)
 KITCHEN = RoomId("kitchen", 3)
 CATEGORIES = ("Pan", "Sink")
 NODES = np.array([[0.5, 1.0], [0.0, 0.25]])
@@ -55,6 +56,7 @@ EXAMPLES: tuple[Message, ...] = (
     Refused("stale", "40 versions behind", 2),
     HEAD,
     ParametersShard(HEAD, 0, VECTOR),
+    ParametersDelta(HEAD, digest_of(BASE), False, 0, np.array([0.25], np.float32), np.array([0, -1], np.int8)),
     ConfigReply("night-3", 2, CATEGORIES, {"method": "hoz", "seed": 3, "learning_rate": 0.001, "minutes": None}),
     StatusReply(
         6,

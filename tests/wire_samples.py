@@ -2,9 +2,12 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 
 import numpy as np
 
+from hoz_dist.a3c.compression.compressor import Compressor
+from hoz_dist.config import Compression
 from hoz_dist.graph.room_graph import RoomGraph
 from hoz_dist.graph.scene_graph import SceneGraph
 from hoz_dist.nav.categories import TARGETS
@@ -15,7 +18,7 @@ from hoz_dist.wire.protocol.graph_messages import PlanReply
 from hoz_dist.wire.protocol.graphs import room_graph_reply, scene_graph_reply
 from hoz_dist.wire.protocol.keys import Keys
 from hoz_dist.wire.protocol.message import Message
-from hoz_dist.wire.protocol.parameters import ParametersHead, ParametersShard
+from hoz_dist.wire.protocol.parameters import ParametersDelta, ParametersHead, ParametersShard
 from hoz_dist.wire.protocol.pushes import EpisodesPush, GradientPush, RoomGraphPush
 from hoz_dist.wire.protocol.run_messages import ConfigReply, LeftProcess, ProcessStatus, StatusReply
 from hoz_dist.wire.serving.inbox import Inbox
@@ -50,6 +53,13 @@ def gradient_push(sequence: int = 0, actor: str = "a0", size: int = 100) -> Grad
     return GradientPush(actor, incarnation=77, sequence=sequence, epoch=1, version=5, frames=40, gradient=gradient)
 
 
+def gradient_push_in(codec: Compression, size: int = 300) -> GradientPush:
+    """A gradient in the form of a codec; of 300 entries the blocks of `int8` are a whole one and a part of one."""
+    full = gradient_push(size=size)
+    assert isinstance(full.gradient, np.ndarray)
+    return replace(full, gradient=Compressor(codec, size, 100.0).compress(full.gradient))
+
+
 def config_reply(epoch: int = 1) -> ConfigReply:
     return ConfigReply(KEYS.run, epoch, TARGETS, {"method": "hoz", "seed": 3, "learning_rate": 1e-3, "minutes": None})
 
@@ -63,7 +73,7 @@ def status_reply() -> StatusReply:
     return StatusReply(5, 1, processes, (LeftProcess("actor", "a1", "h1", 79, 2.5),), {"epoch": 1}, details)
 
 
-HEAD = ParametersHead(epoch=1, version=5, digest="0123456789abcdef", size=100, shards=1)
+HEAD = ParametersHead(epoch=1, version=5, size=100)
 MESSAGES: tuple[Message, ...] = (
     gradient_push(),
     EpisodesPush("a0", 77, 3, episodes=(EPISODE, EPISODE), policy_loss=-0.5, entropy=1.75),
@@ -73,13 +83,15 @@ MESSAGES: tuple[Message, ...] = (
     Refused("stale", "too old", 1),
     HEAD,
     ParametersShard(HEAD, 0, np.arange(100, dtype=np.float32)),
+    ParametersDelta(HEAD, "0123456789abcdef", True, 0, np.ones(1, np.float32), np.arange(100, dtype=np.int8)),
     config_reply(),
     scene_graph_reply(scene_graph(), 1),
     room_graph_reply(room_graph(), 1),
     PlanReply(1, 0, 3, 2, (0, 2, 3), 0.25),
     status_reply(),
+    *(gradient_push_in(codec) for codec in ("bf16", "int8", "topk")),
 )
-"""One message of every kind."""
+"""One message of every kind, and a gradient in every form."""
 
 
 @contextmanager

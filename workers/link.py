@@ -108,7 +108,9 @@ class LearnerLink(Closing):
             stack.enter_context(
                 declare_alive(session, self._keys, Member("actor", actor, host_name(), self._incarnation))
             )
-            self._parameters = stack.enter_context(ParametersFollower(session, self._keys, stop, self._epochs))
+            self._parameters = stack.enter_context(
+                ParametersFollower(session, self._keys, stop, self._epochs, deltas=self.config.parameters == "delta")
+            )
             self._graphs = stack.enter_context(
                 NewestSubscriber(
                     session,

@@ -12,7 +12,7 @@ from hoz_dist.waiting import FIRST_TRY_S, Deadline, Patience
 from hoz_dist.wire.client.epochs import Epochs
 from hoz_dist.wire.protocol.message import Message
 from hoz_dist.wire.protocol.rejection import OtherVersionError, RejectedError
-from hoz_dist.wire.transport.ask import ask, messages_in
+from hoz_dist.wire.transport.ask import Question, messages_in
 
 _log = logging.getLogger(__name__)
 M = TypeVar("M", bound=Message)
@@ -59,17 +59,24 @@ class Asking:
             OtherVersionError: The learner speaks another version of the protocol.
             AnotherRunError: The learner has begun another run.
         """
-        began = time.monotonic()
-        answers = ask(
-            self._session,
-            selector,
-            timeout_s=deadline.within(self._patience.seconds),
-            stop=self._stop,
-            payload=payload,
-            attachment=attachment,
-        )
+        return self.finish(self.begin(selector, deadline, payload, attachment), *expected)
+
+    def begin(
+        self,
+        selector: str,
+        deadline: Deadline,
+        payload: bytes | ZBytes | None = None,
+        attachment: bytes | None = None,
+    ) -> Question:
+        """Ask, without waiting for the answer; see `once`."""
+        timeout_s = deadline.within(self._patience.seconds)
+        return Question(self._session, selector, timeout_s, payload, attachment)
+
+    def finish(self, question: Question, *expected: type[M]) -> M | None:
+        """Wait for the answer to a question; see `once`."""
+        answers = question.gather(self._stop)
         if answers:
-            self._patience.answered(time.monotonic() - began)
+            self._patience.answered(time.monotonic() - question.asked)
         elif answers.timed_out:
             self._patience.timed_out()
         try:

@@ -1,8 +1,10 @@
 """Fetches parameters: follows the small heads that are published, and asks for the bulk shard by shard."""
 
-import logging
 import secrets
 import threading
+import time
+from collections import deque
+from typing import Final
 
 from zenoh import Session
 
@@ -10,15 +12,25 @@ from hoz_dist.closing import Closing
 from hoz_dist.errors import ConnectionFailedError
 from hoz_dist.waiting import Backoff, Deadline
 from hoz_dist.wire.client.asking import Asking
-from hoz_dist.wire.client.download import Download
+from hoz_dist.wire.client.download import Base, Download, base_of
 from hoz_dist.wire.client.epochs import AnotherRunError, Epochs
 from hoz_dist.wire.protocol.answers import Busy, Refused
 from hoz_dist.wire.protocol.keys import Keys
-from hoz_dist.wire.protocol.parameters import Parameters, ParametersHead, ParametersShard
-from hoz_dist.wire.protocol.rejection import RejectedError
+from hoz_dist.wire.protocol.parameters import (
+    NO_BASE,
+    Parameters,
+    ParametersDelta,
+    ParametersHead,
+    ParametersShard,
+)
+from hoz_dist.wire.transport.ask import Question
+from hoz_dist.wire.transport.buffers import Buffers
 from hoz_dist.wire.transport.publishing import NewestSubscriber
 
-_log = logging.getLogger(__name__)
+MOST_UNDER_WAY: Final = 2
+"""Shards that are under way at once over a fast link; so many fit into the queue of a link that stands still."""
+FAST_S: Final = 0.05
+"""Over a link that takes longer for a shard, one is under way at a time."""
 
 
 class ParametersFollower(Closing):
@@ -29,14 +41,26 @@ class ParametersFollower(Closing):
         keys: Keys of the run.
         stop: Ends a fetch that waits.
         epochs: What is known of the learner's epochs; parameters of a lower one do not count.
+        deltas: Whether to fetch the difference to a base, which is fetched once.
     """
 
-    def __init__(self, session: Session, keys: Keys, stop: threading.Event, epochs: Epochs | None = None) -> None:
+    def __init__(
+        self,
+        session: Session,
+        keys: Keys,
+        stop: threading.Event,
+        epochs: Epochs | None = None,
+        *,
+        deltas: bool = False,
+    ) -> None:
         self._keys = keys
         self._stop = stop
         known = epochs or Epochs()
         self._asking = Asking(session, stop, known)
         self._reader = f"r{secrets.token_hex(8)}"
+        self._buffers = Buffers()
+        self._deltas = deltas
+        self._base: Base | None = None
         self._fetched: Parameters | None = None
         self._subscriber = NewestSubscriber(
             session,
@@ -70,26 +94,70 @@ class ParametersFollower(Closing):
         if at_least is not None and self._fetched is not None and self._is_newest(self._fetched, at_least):
             return self._fetched
         wanted = max(at_least or (0, 0), self._fetched.head.stamp if self._fetched else (0, 0))
-        download = Download()
+        while True:
+            fetched = self._newest_or_base(wanted, timeout_s)
+            if fetched is not None:
+                self._fetched = fetched
+                return fetched
+
+    def _newest_or_base(self, wanted: tuple[int, int], timeout_s: float | None) -> Parameters | None:
+        """Fetch the newest parameters, or the base that is needed for that; None after a base that is not enough.
+
+        Args:
+            wanted: Epoch and version that they must have reached; a base need not.
+            timeout_s: When to give up after the last shard that came, seconds; None for never.
+
+        Raises:
+            StoppedError: The stop event was set.
+            HozError: See `fetch`.
+        """
+        download = Download(self._buffers, self._base)
+        under_way: deque[Question] = deque()
+        window = 1
         deadline, backoff = Deadline(timeout_s), Backoff(self._stop)
         while True:
-            reply = self._asking.once(self._selector(download), deadline, ParametersShard, Busy, Refused)
-            if isinstance(reply, ParametersShard) and self._is_late_enough(reply.head, wanted) and download.add(reply):
-                if (fetched := _whole(download)) is not None:
-                    self._fetched = fetched
-                    return fetched
-                deadline, backoff = Deadline(timeout_s), Backoff(self._stop)
-                continue
-            if isinstance(reply, ParametersShard | Refused):
+            while len(under_way) < window and download.next + len(under_way) < download.shards:
+                selector = self._selector(download, download.next + len(under_way))
+                under_way.append(self._asking.begin(selector, deadline))
+            question = under_way.popleft()
+            reply = self._asking.finish(question, ParametersShard, ParametersDelta, ParametersHead, Busy, Refused)
+            if isinstance(reply, ParametersHead) and self._base is not None and self._is_late_enough(reply, wanted):
+                # Of this version the base is; though perhaps it was fetched as that of another learner.
+                self._base = Base(Parameters(reply, self._base.parameters.vector), self._base.digest)
+                return self._base.parameters
+            if isinstance(reply, ParametersShard | ParametersDelta):
+                enough = self._is_late_enough(reply.head, wanted)
+                if (enough or self._is_base(reply)) and download.add(reply):
+                    if (parameters := download.result()) is not None:
+                        return self._kept(parameters, renews=download.renews, enough=enough)
+                    window = MOST_UNDER_WAY if time.monotonic() - question.asked < FAST_S else 1
+                    deadline, backoff = Deadline(timeout_s), Backoff(self._stop)
+                    continue
+            under_way.clear()  # whatever comes of them is of no use any more
+            if reply is not None and not isinstance(reply, Busy):
                 download.begin_again()  # the version is gone; or another learner answers
             if deadline.passed:
                 message = f"The learner did not serve parameters of version {wanted[1]} or later in {timeout_s:g} s."
                 raise ConnectionFailedError(message)
             backoff.pause(deadline)
 
-    def _selector(self, download: Download) -> str:
-        """Ask for the first shard of the newest version, or for the next one of the version that it was."""
-        selector = f"{self._keys.shard(download.next)}?reader={self._reader}"
+    def _kept(self, parameters: Parameters, *, renews: bool, enough: bool) -> Parameters | None:
+        """Keep parameters if they are a base; return them unless something newer is wanted, or was heard of."""
+        if not (self._deltas and renews):
+            return parameters
+        self._base = base_of(parameters)
+        is_newest = self.newest is not None and parameters.head.stamp >= self.newest.stamp
+        return parameters if enough and is_newest else None
+
+    def _is_base(self, part: ParametersShard | ParametersDelta) -> bool:
+        """Tell whether a part is of a base."""
+        return self._deltas and (part.renews if isinstance(part, ParametersDelta) else True)
+
+    def _selector(self, download: Download, shard: int) -> str:
+        """Ask for the first shard of what is to be read next, or for another one of what is being read."""
+        selector = f"{self._keys.shard(shard)}?reader={self._reader}"
+        if self._deltas:
+            selector += f";base={NO_BASE if self._base is None else self._base.digest}"
         head = download.head
         return selector if head is None else f"{selector};epoch={head.epoch};version={head.version}"
 
@@ -115,13 +183,3 @@ class ParametersFollower(Closing):
     def close(self) -> None:
         """Stop following."""
         self._subscriber.close()
-
-
-def _whole(download: Download) -> Parameters | None:
-    """Return the parameters when all shards have come; should they be damaged, they are dropped."""
-    try:
-        return download.result()
-    except RejectedError as error:
-        _log.warning("fetched parameters that cannot be used: %s", error)
-        download.begin_again()
-        return None

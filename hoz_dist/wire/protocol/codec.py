@@ -16,7 +16,7 @@ from hoz_dist.wire.protocol.answers import Accepted, Busy, Refused
 from hoz_dist.wire.protocol.bulk import BulkReader, Layout
 from hoz_dist.wire.protocol.graph_messages import PlanReply, RoomGraphReply, SceneGraphReply
 from hoz_dist.wire.protocol.message import Message
-from hoz_dist.wire.protocol.parameters import ParametersHead, ParametersShard
+from hoz_dist.wire.protocol.parameters import ParametersDelta, ParametersHead, ParametersShard
 from hoz_dist.wire.protocol.pushes import EpisodesPush, GradientPush, RoomGraphPush
 from hoz_dist.wire.protocol.rejection import OtherVersionError, Reason, RejectedError, shown
 from hoz_dist.wire.protocol.run_messages import ConfigReply, StatusReply
@@ -36,6 +36,7 @@ MESSAGES: Final[dict[str, type[Message]]] = {
         Refused,
         ParametersHead,
         ParametersShard,
+        ParametersDelta,
         ConfigReply,
         SceneGraphReply,
         RoomGraphReply,

@@ -1,8 +1,8 @@
-"""Serves parameters: a small head is published, the bulk is given out in shards, one after the other.
+"""Serves parameters: a small head is published, the bulk is given out in shards.
 
-The version that somebody is reading is kept, so that a fetch never mixes two, however fast the learner is. One shard at
-a time is under way to each reader, and fits the sending queue of its link: who reads slowly, or stands still, holds up
-nobody else.
+The version that somebody is reading is kept, so that a fetch never mixes two, however fast the learner is. Few shards
+at a time are under way to each reader, and fit the sending queue of its link: who reads slowly, or stands still, holds
+up nobody else. Whoever wants it gets the difference to a base that it has, in a quarter of the bytes.
 """
 
 import time
@@ -15,14 +15,26 @@ from zenoh import KeyExpr, Query, Session
 from hoz_dist.closing import Closing
 from hoz_dist.stages import StageClock
 from hoz_dist.wire.protocol.answers import Busy
+from hoz_dist.wire.protocol.codec import encode, lay_out
 from hoz_dist.wire.protocol.keys import NAME_PATTERN, Keys
-from hoz_dist.wire.protocol.message import SHARD_ELEMENTS, Message
-from hoz_dist.wire.protocol.parameters import Parameters, ParametersHead, ParametersShard, head_of
+from hoz_dist.wire.protocol.message import DIGEST
+from hoz_dist.wire.protocol.parameters import NO_BASE, ParametersHead, Part
 from hoz_dist.wire.protocol.rejection import Reason, RejectedError, shown
 from hoz_dist.wire.protocol.rejections import Rejections
+from hoz_dist.wire.serving.bases import Bases
+from hoz_dist.wire.serving.editions import Edition, Full
 from hoz_dist.wire.serving.versions import Versions
+from hoz_dist.wire.transport.buffers import Buffers
+from hoz_dist.wire.transport.outgoing import Outgoing
 from hoz_dist.wire.transport.publishing import NewestPublisher
-from hoz_dist.wire.transport.queryable import answer, check_question, declare_queryable, parameters_of, refuse
+from hoz_dist.wire.transport.queryable import (
+    answer,
+    check_question,
+    declare_queryable,
+    parameters_of,
+    refuse,
+    reply,
+)
 from hoz_dist.wire.transport.shared_memory import SharedMemory
 
 _LONGEST_NUMBER: Final = 18
@@ -52,9 +64,11 @@ class ParametersPublisher(Closing):
     ) -> None:
         self._keys = keys
         self._clock = clock or StageClock()
-        self._memory = memory
+        self._outgoing = Outgoing(memory or SharedMemory(on=False))
         self._rejections = rejections or Rejections()
         self._versions = versions or Versions()
+        self._buffers = Buffers()
+        self._bases = Bases(self._buffers)
         self._publisher = NewestPublisher(session, keys.params)
         self._queryable = declare_queryable(session, keys.all_params, self._measured, rejections=self._rejections)
 
@@ -66,11 +80,9 @@ class ParametersPublisher(Closing):
             version: Version of the parameters; never falls within an epoch.
             vector: [P] f32; copied, so that the learner may go on with its own.
         """
-        copy = np.array(vector, "<f4")
-        copy.flags.writeable = False
-        head = head_of(epoch, version, copy)
-        self._versions.newest = Parameters(head, copy)
-        self._publisher.publish(head)
+        head = ParametersHead(epoch, version, vector.size)
+        self._versions.newest = Full(head, self._buffers.copy(vector))
+        self._publisher.publish(encode(head))
         return head
 
     def close(self) -> None:
@@ -92,48 +104,61 @@ class ParametersPublisher(Closing):
         try:
             check_question(query)
             if query.key_expr.intersects(KeyExpr(self._keys.params)):
-                key, memory = self._keys.params, None
-                reply: Message = newest.head
-            else:
-                key, memory = str(query.key_expr), self._memory
-                reply = self._shard(key.removeprefix(self._keys.params + "/"), parameters_of(query)) or Busy(epoch)
+                answer(query, self._keys.params, newest.head)
+                return
+            key = str(query.key_expr)
+            part = self._part(key.removeprefix(self._keys.params + "/"), parameters_of(query), newest)
         except RejectedError as error:
             refuse(query, error, epoch, self._rejections)
+            return
+        if part is None:
+            answer(query, key, Busy(epoch))
         else:
-            answer(query, key, reply, memory)
+            data, checksum = self._outgoing.payload(lay_out(part))
+            reply(query, key, data, checksum)
 
-    def _shard(self, name: str, asked: dict[str, str]) -> ParametersShard | None:
-        """Return the shard that is asked for; None when one more version cannot be kept now.
+    def _part(self, name: str, asked: dict[str, str], newest: Full) -> Part | ParametersHead | None:
+        """Return the part that is asked for, or the head of what the reader has; None when no more can be kept now.
 
         Args:
             name: Number of the shard, the last part of the key.
-            asked: ``reader``: who asks; ``epoch`` and ``version``: of what; for shard 0 the newest when not given.
+            asked: ``reader``: who asks; ``epoch`` and ``version``: of what, unless for the first shard; ``base``: from
+                who wants deltas, the digest of the base that it has, or ``none``.
+            newest: The newest version.
 
         Raises:
             RejectedError: The version is gone, there is no such shard, or the question cannot be understood.
         """
-        number, reader, now = _number("the shard", name), asked.get("reader", ""), time.monotonic()
+        number, reader, base = _number("the shard", name), asked.get("reader", ""), asked.get("base")
         if not NAME_PATTERN.fullmatch(reader):
             raise RejectedError(Reason.NAME, f"the reader's name is not well formed: {shown(reader)}")
+        if base is not None and base != NO_BASE:
+            DIGEST.check(base, "the base")
+        now = time.monotonic()
         if "version" in asked:
             stamp = (_number("the epoch", asked.get("epoch", "")), _number("the version", asked["version"]))
-            parameters = self._versions.go_on(reader, stamp, number, now)
-            if parameters is None:
+            edition = self._versions.go_on(reader, stamp, number, now, deltas=base is not None)
+            if edition is None:
                 raise RejectedError(Reason.GONE, f"version {stamp[1]} of epoch {stamp[0]} is not kept any more")
         elif number > 0:
             raise RejectedError(Reason.RANGE, f"shard {number} of no version was asked for; only 0 is the newest's")
         else:
-            begun = self._versions.begin(reader, now)
-            if begun is None:
+            edition = newest if base is None else self._next_for(base, newest)
+            if edition is None:
+                return newest.head
+            if not self._versions.begin(reader, edition, now):
                 return None
-            parameters = begun
-        head = parameters.head
-        if number >= head.shards:
-            raise RejectedError(Reason.RANGE, f"shard {number} was asked for, and there are {head.shards}")
-        if number == head.shards - 1:
+        if number >= edition.shards:
+            raise RejectedError(Reason.RANGE, f"shard {number} was asked for, and there are {edition.shards}")
+        if number == edition.shards - 1:
             self._versions.end(reader)
-        start = number * SHARD_ELEMENTS
-        return ParametersShard(head, number, parameters.vector[start : start + SHARD_ELEMENTS])
+        return edition.part(number)
+
+    def _next_for(self, base: str, newest: Full) -> Edition | None:
+        """Return what a reader of deltas needs; None when its base is the newest version."""
+        edition = self._bases.next_for(base, newest)
+        self._versions.besides = self._bases.kept
+        return edition
 
 
 def _number(what: str, text: str) -> int:

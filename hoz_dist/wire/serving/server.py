@@ -17,17 +17,22 @@ from hoz_dist.graph.scene_graph import SceneGraph
 from hoz_dist.stages import StageClock
 from hoz_dist.wire.protocol.answers import Refused
 from hoz_dist.wire.protocol.codec import checksum, decode, encode
-from hoz_dist.wire.protocol.graphs import room_graph_reply, scene_graph_reply
 from hoz_dist.wire.protocol.keys import Keys, sender_of
-from hoz_dist.wire.protocol.message import Message
 from hoz_dist.wire.protocol.pushes import EpisodesPush, GradientPush, Push, RoomGraphPush
 from hoz_dist.wire.protocol.rejection import Reason, RejectedError
 from hoz_dist.wire.protocol.rejections import Rejections
 from hoz_dist.wire.protocol.trajectories import TrajectoryPush
 from hoz_dist.wire.serving.inbox import Inbox, Reaper, Request
-from hoz_dist.wire.serving.snapshots import GraphReply, Snapshots
+from hoz_dist.wire.serving.snapshots import Snapshots
 from hoz_dist.wire.transport.publishing import NewestPublisher
-from hoz_dist.wire.transport.queryable import answer, check_question, declare_queryable, parameters_of, refuse
+from hoz_dist.wire.transport.queryable import (
+    answer,
+    check_question,
+    declare_queryable,
+    parameters_of,
+    refuse,
+    reply,
+)
 
 _CHECKSUM_BYTES: Final = 8
 MOST_BYTES_OF_GRAPHS: Final = 512 * 1024
@@ -86,11 +91,12 @@ class Server(Closing):
         self._publishers: dict[str, NewestPublisher] = {}
         for graph in graphs:
             self.put_graph(graph)
+        config = encode(snapshots.config)
         handlers: dict[str, Callable[[Query], None]] = {
             keys.all_grads: lambda query: self._receive(query, GradientPush),
             keys.all_rollouts: lambda query: self._receive(query, EpisodesPush, TrajectoryPush),
             keys.all_rooms: lambda query: self._receive(query, RoomGraphPush),
-            keys.config: self._limited(lambda query: answer(query, keys.config, snapshots.config)),
+            keys.config: self._limited(lambda query: reply(query, keys.config, config)),
             keys.status: self._limited(lambda query: answer(query, keys.status, snapshots.status())),
             keys.all_graphs: self._limited(self._answer_graph),
             keys.all_plans: self._limited(self._answer_plan),
@@ -102,15 +108,11 @@ class Server(Closing):
 
     def put_graph(self, graph: SceneGraph | RoomGraph) -> None:
         """Serve a graph instead of the one of the same scene or room so far, and publish it."""
-        if isinstance(graph, SceneGraph):
-            name: str = graph.scene
-            reply: GraphReply = scene_graph_reply(graph, self._epoch)
-        else:
-            name, reply = graph.room, room_graph_reply(graph, self._epoch)
-        self.snapshots.graphs = {**self.snapshots.graphs, name: reply}
+        name = graph.scene if isinstance(graph, SceneGraph) else graph.room
+        snapshot = self.snapshots.put(name, graph)
         if name not in self._publishers:
             self._publishers[name] = NewestPublisher(self.session, self._keys.graph(name))
-        self._publishers[name].publish(reply)
+        self._publishers[name].publish(snapshot.payload)
 
     def close(self) -> None:
         """Stop serving; who asks from now on gets no answer."""
@@ -181,7 +183,7 @@ class Server(Closing):
         prefix = self._keys.graph("")
         name = str(query.key_expr).removeprefix(prefix)
         if "*" not in name:
-            self._answer_or_refuse(query, lambda: self.snapshots.graph(name))
+            self._answer_or_refuse(query, lambda: self.snapshots.graph(name).payload)
             return
         try:
             selected = self._selected(query.key_expr, prefix)
@@ -199,9 +201,9 @@ class Server(Closing):
             RejectedError: They are too much for one question.
         """
         selected, size = {}, 0
-        for name, graph in self.snapshots.graphs.items():
+        for name, (_, payload) in self.snapshots.graphs.items():
             if key_expr.intersects(KeyExpr(prefix + name)):
-                selected[prefix + name] = payload = encode(graph)
+                selected[prefix + name] = payload
                 size += len(payload)
             if size > MOST_BYTES_OF_GRAPHS:
                 limit = f"{MOST_BYTES_OF_GRAPHS >> 10} KiB"
@@ -213,13 +215,13 @@ class Server(Closing):
     def _answer_plan(self, query: Query) -> None:
         """Answer with a plan for the target and the seen categories that the parameters name."""
         scene = str(query.key_expr).removeprefix(self._keys.plan(""))
-        self._answer_or_refuse(query, lambda: self.snapshots.plan(scene, parameters_of(query)))
+        self._answer_or_refuse(query, lambda: encode(self.snapshots.plan(scene, parameters_of(query))))
 
-    def _answer_or_refuse(self, query: Query, make: Callable[[], Message]) -> None:
-        """Answer a question, or say in one sentence what is wrong with it."""
+    def _answer_or_refuse(self, query: Query, make: Callable[[], bytes]) -> None:
+        """Answer a question with an encoded message, or say in one sentence what is wrong with it."""
         try:
-            message = make()
+            payload = make()
         except HozError as error:
             refuse(query, error, self._epoch, self.rejections)
         else:
-            answer(query, str(query.key_expr), message)
+            reply(query, str(query.key_expr), payload)

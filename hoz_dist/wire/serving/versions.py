@@ -4,7 +4,7 @@ import threading
 from collections import OrderedDict
 from typing import Final, NamedTuple
 
-from hoz_dist.wire.protocol.parameters import Parameters
+from hoz_dist.wire.serving.editions import Edition, Full
 
 MOST_READERS: Final = 1024
 MOST_BYTES: Final = 512 * 1024 * 1024
@@ -18,7 +18,7 @@ HELD_S: Final = 60.0
 
 
 class _Reading(NamedTuple):
-    parameters: Parameters
+    edition: Edition
     began: float
     """When the reader asked for the first shard."""
     shard: int
@@ -30,13 +30,17 @@ class _Reading(NamedTuple):
 class Versions:
     """The newest version and those being read, each array once; may be used from several threads.
 
-    A reader is begun with the newest version and can then read all of it, as long as it gets on and there is room. So a
-    slow reader neither gets parts of two versions nor has to begin again, however fast the learner is. Nobody can keep
-    the others out: what was held longest makes room.
+    A reader is begun with an edition, of the newest version mostly, and can then read all of it, as long as it gets on
+    and there is room. So a slow reader neither gets parts of two versions nor has to begin again, however fast the
+    learner is. Nobody can keep the others out: what was held longest makes room.
 
     Args:
         most_readers: Largest number of readers.
         most_bytes: Largest number of bytes that are kept for them.
+
+    Attributes:
+        newest: The newest version; None before there is one.
+        besides: What is kept for other reasons than being read.
     """
 
     def __init__(self, most_readers: int = MOST_READERS, most_bytes: int = MOST_BYTES) -> None:
@@ -45,18 +49,12 @@ class Versions:
         self._lock = threading.Lock()
         self._readings: OrderedDict[str, _Reading] = OrderedDict()
         """By reader, the one that got on longest ago first."""
-        self.newest: Parameters | None = None
+        self.newest: Full | None = None
+        self.besides: tuple[Edition, ...] = ()
 
-    def begin(self, reader: str, now: float) -> Parameters | None:
-        """Return the newest version and keep it for a reader of shard 0; None when nothing more can be kept.
-
-        Raises:
-            LookupError: There are no parameters yet.
-        """
+    def begin(self, reader: str, edition: Edition, now: float) -> bool:
+        """Keep an edition for a reader of its shard 0; False when nothing more can be kept."""
         with self._lock:
-            newest = self.newest
-            if newest is None:
-                raise LookupError
             self._expire(now, EXPIRES_S)
             if not self._has_room():
                 self._expire(now, YIELDS_S)
@@ -64,25 +62,35 @@ class Versions:
                 if not self._drop_the_oldest(now):
                     # Who begins again must not get its own room back before the others had a chance.
                     self._readings.pop(reader, None)
-                    return None
+                    return False
             self._readings.pop(reader, None)  # to be the last one
-            self._readings[reader] = _Reading(newest, now, 0, now)
-            return newest
+            self._readings[reader] = _Reading(edition, now, 0, now)
+            return True
 
-    def go_on(self, reader: str, stamp: tuple[int, int], shard: int, now: float) -> Parameters | None:
-        """Return the version of which a reader has read a part; None when it is not kept any more.
+    def go_on(
+        self, reader: str, stamp: tuple[int, int], shard: int, now: float, *, deltas: bool = False
+    ) -> Edition | None:
+        """Return the edition of which a reader has read a part; None when it is not kept any more.
 
         A shard that it asked for before, or that there is not, does not count as getting on.
+
+        Args:
+            reader: Who reads.
+            stamp: Epoch and version of the edition.
+            shard: Number of the shard that it asks for.
+            now: Time, seconds.
+            deltas: Whether it reads deltas and their bases. The newest version is then no substitute: a base that was
+                made by a delta is not to the bit the version that the learner has.
         """
         with self._lock:
             reading = self._readings.get(reader)
-            if reading is not None and reading.parameters.head.stamp == stamp:
-                if reading.shard < shard < reading.parameters.head.shards:
+            if reading is not None and reading.edition.head.stamp == stamp:
+                if reading.shard < shard < reading.edition.shards:
                     self._readings[reader] = reading._replace(shard=shard, time=now)
                     self._readings.move_to_end(reader)
-                return reading.parameters
+                return reading.edition
             newest = self.newest
-            return newest if newest is not None and newest.head.stamp == stamp else None
+            return newest if not deltas and newest is not None and newest.head.stamp == stamp else None
 
     def end(self, reader: str) -> None:
         """Forget a reader that has read all."""
@@ -90,7 +98,7 @@ class Versions:
             self._readings.pop(reader, None)
 
     def kept_bytes(self) -> int:
-        """Return the bytes of all versions that are kept."""
+        """Return the bytes of all that is kept."""
         with self._lock:
             return self._bytes()
 
@@ -98,9 +106,11 @@ class Versions:
         return len(self._readings) < self._most_readers and self._bytes() <= self._most_bytes
 
     def _bytes(self) -> int:
-        kept = [reading.parameters for reading in self._readings.values()]
-        kept += [self.newest] if self.newest is not None else []
-        return sum({one.head.stamp: one.vector.nbytes for one in kept}.values())
+        kept: set[Edition] = {reading.edition for reading in self._readings.values()}
+        kept.update(self.besides)
+        if self.newest is not None:
+            kept.add(self.newest)
+        return sum(edition.nbytes for edition in kept)
 
     def _expire(self, now: float, after_s: float) -> None:
         """Forget the readers that did not get on for so long."""
@@ -111,10 +121,10 @@ class Versions:
             del self._readings[reader]
 
     def _drop_the_oldest(self, now: float) -> bool:
-        """Forget the readers of the version that is held longest; False when none is held long enough."""
+        """Forget the readers of the edition that is held longest; False when none is held long enough."""
         oldest = min(self._readings.values(), key=lambda reading: reading.began, default=None)
         if oldest is None or now - oldest.began < HELD_S:
             return False
-        for reader in [name for name, one in self._readings.items() if one.parameters is oldest.parameters]:
+        for reader in [name for name, one in self._readings.items() if one.edition is oldest.edition]:
             del self._readings[reader]
         return True

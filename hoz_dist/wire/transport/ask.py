@@ -1,22 +1,24 @@
 """Asking a question over Zenoh and gathering what comes back."""
 
+import queue
 import threading
+import time
 from collections.abc import Iterable
 from typing import Final, NamedTuple, TypeVar
 
 import zenoh
 from zenoh import Session
-from zenoh.handlers import FifoChannel
+from zenoh.handlers import Callback
 
 from hoz_dist.waiting import Deadline, StoppedError
-from hoz_dist.wire.protocol.codec import decode
+from hoz_dist.wire.protocol.codec import checksum, decode
 from hoz_dist.wire.protocol.message import Message
-from hoz_dist.wire.protocol.rejection import RejectedError
+from hoz_dist.wire.protocol.rejection import Reason, RejectedError
 
 _TIMED_OUT: Final = b"Timeout"
 """What Zenoh itself puts into an error reply when a queryable holds a query too long."""
-_FIRST_PAUSE_S: Final = 0.0001
-_LONGEST_PAUSE_S: Final = 0.005
+_LOOK_S: Final = 0.05
+"""How soon a wait notices that it is to stop; an answer it notices at once."""
 _MARGIN_S: Final = 1.0
 """Zenoh ends a query by itself; this much later we stop believing that it will."""
 STRAGGLERS_S: Final = 1.0
@@ -31,6 +33,8 @@ class Answer(NamedTuple):
     key: str
     """Concrete key that it came from; empty for an error reply."""
     payload: bytes
+    checksum: bytes | None = None
+    """What was sent along as the payload's checksum."""
 
 
 class Answers(list[Answer]):
@@ -57,6 +61,7 @@ class Question:
         attachment: What to send along besides.
 
     Attributes:
+        asked: When it was asked, seconds of the monotonic clock.
         answers: What came back so far.
     """
 
@@ -68,38 +73,48 @@ class Question:
         payload: bytes | zenoh.ZBytes | None = None,
         attachment: bytes | None = None,
     ) -> None:
+        self.asked = time.monotonic()
         self.answers = Answers()
         self._deadline = Deadline(timeout_s + _MARGIN_S)
-        self._replies: zenoh.handlers.Handler[zenoh.Reply] = session.get(
+        # Zenoh's own channels can be polled, or waited for without end. So its receive thread fills a queue of ours,
+        # which is all that it does, and is waited for with an end.
+        replies: queue.SimpleQueue[zenoh.Reply | None] = queue.SimpleQueue()
+        self._replies = replies
+        session.get(
             selector,
-            FifoChannel(1024),
+            Callback(replies.put, lambda: replies.put(None), indirect=False),
             timeout=timeout_s,
             consolidation=zenoh.ConsolidationMode.NONE,
             payload=payload,
             attachment=attachment,
         )
 
-    def poll(self) -> bool:
-        """Gather what has come; True when nothing more will."""
-        while True:
-            try:
-                reply = self._replies.try_recv()
-            except zenoh.ZError:  # the channel is closed: that was the last reply
-                return True
-            if reply is None:
-                break
-            if reply.ok is not None:
-                self._add(str(reply.ok.key_expr), reply.ok.payload)
-            elif reply.err is not None:
-                self._add("", reply.err.payload)
-        if self._deadline.passed:
-            self.answers.timed_out = not self.answers
-            return True
-        return False
+    def gather(self, stop: threading.Event) -> Answers:
+        """Wait until nothing more will come, or the time is over, and return what came.
 
-    def _add(self, key: str, payload: zenoh.ZBytes) -> None:
-        answer = Answer(key, payload.to_bytes())
-        if not key and answer.payload == _TIMED_OUT:
+        Raises:
+            StoppedError: The stop event was set.
+        """
+        while not self._deadline.passed:
+            try:
+                reply = self._replies.get(timeout=self._deadline.within(_LOOK_S))
+            except queue.Empty:
+                if stop.is_set():
+                    raise StoppedError from None
+                continue
+            if reply is None:
+                return self.answers
+            if reply.ok is not None:
+                attachment = reply.ok.attachment
+                told = None if attachment is None else attachment.to_bytes()
+                self._add(Answer(str(reply.ok.key_expr), reply.ok.payload.to_bytes(), told))
+            elif reply.err is not None:
+                self._add(Answer("", reply.err.payload.to_bytes()))
+        self.answers.timed_out = not self.answers
+        return self.answers
+
+    def _add(self, answer: Answer) -> None:
+        if not answer.key and answer.payload == _TIMED_OUT:
             self.answers.timed_out = True
             return
         self.answers.append(answer)
@@ -128,22 +143,15 @@ def ask(
     Raises:
         StoppedError: The stop event was set.
     """
-    stop = stop or threading.Event()
     question = Question(session, selector, timeout_s, payload, attachment)
-    pause = _FIRST_PAUSE_S
-    # Polling, because a blocking receive cannot be stopped.
-    while not question.poll():
-        if stop.wait(pause):
-            raise StoppedError
-        pause = min(1.2 * pause, _LONGEST_PAUSE_S)
-    return question.answers
+    return question.gather(stop or threading.Event())
 
 
 def messages_in(answers: Iterable[Answer], *expected: type[M]) -> list[M]:
     """Return the messages that answers hold.
 
-    Those that cannot be read are left out, unless there are no others: a learner of another release may serve another
-    run on the same router.
+    Those that cannot be read, or do not have the checksum sent along, are left out, unless there are no others: a
+    learner of another release may serve another run on the same router.
 
     Raises:
         RejectedError: There are answers, and none can be read.
@@ -152,9 +160,22 @@ def messages_in(answers: Iterable[Answer], *expected: type[M]) -> list[M]:
     rejected: RejectedError | None = None
     for answer in answers:
         try:
-            messages.append(decode(answer.payload, *expected))
+            messages.append(_checked(answer, *expected))
         except RejectedError as error:
             rejected = rejected or error
     if rejected is not None and not messages:
         raise rejected
     return messages
+
+
+def _checked(answer: Answer, *expected: type[M]) -> M:
+    """Return the message that an answer holds.
+
+    Raises:
+        RejectedError: It was damaged on the way, or cannot be read.
+    """
+    if answer.checksum is not None and answer.checksum != checksum(answer.payload):
+        raise RejectedError(
+            Reason.CHECKSUM, f"the {len(answer.payload)} bytes of the answer do not have the checksum sent along"
+        )
+    return decode(answer.payload, *expected)

@@ -21,7 +21,7 @@ from zenoh.ext import (
 from zenoh.handlers import FifoChannel
 
 from hoz_dist.closing import Closing
-from hoz_dist.wire.protocol.codec import decode, encode
+from hoz_dist.wire.protocol.codec import decode
 from hoz_dist.wire.protocol.message import Message
 from hoz_dist.wire.protocol.rejection import Reason, RejectedError
 from hoz_dist.wire.protocol.rejections import Rejections
@@ -52,9 +52,9 @@ class NewestPublisher:
             publisher_detection=True,
         )
 
-    def publish(self, message: Message) -> None:
-        """Publish a message."""
-        self._publisher.put(encode(message))
+    def publish(self, payload: bytes) -> None:
+        """Publish an encoded message."""
+        self._publisher.put(payload)
 
     def close(self) -> None:
         """Stop publishing; late joiners find nothing from now on."""

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from typing import Final
 
 import zenoh
-from zenoh import Query, Session
+from zenoh import Query, Session, ZBytes
 from zenoh.handlers import FifoChannel
 
 from hoz_dist.errors import HozError, NotFoundError, UnknownNameError
@@ -16,7 +16,6 @@ from hoz_dist.wire.protocol.message import Message
 from hoz_dist.wire.protocol.rejection import Reason, RejectedError, plain
 from hoz_dist.wire.protocol.rejections import Rejections
 from hoz_dist.wire.transport.draining import Drain
-from hoz_dist.wire.transport.shared_memory import SharedMemory
 
 LONGEST_QUESTION: Final = 4096
 """Characters of a question's key and parameters; the longest that makes sense names all categories."""
@@ -26,21 +25,33 @@ _CHANNEL: Final = 16
 """Queries that Zenoh holds while the thread is busy with the one before; more of them block the sender's transport."""
 
 
-def answer(query: Query, key: str, message: Message, memory: SharedMemory | None = None) -> None:
+def answer(query: Query, key: str, message: Message) -> None:
     """Answer a query with one message and let go of it.
 
     Args:
         query: The query.
         key: Concrete key of what the message tells.
         message: ``busy`` and ``refused`` travel as error replies, for which the key does not matter.
-        memory: Shared memory for a large message; None for none.
+    """
+    payload = encode(message)
+    if not isinstance(message, Busy | Refused):
+        reply(query, key, payload)
+        return
+    with query:
+        query.reply_err(payload)
+
+
+def reply(query: Query, key: str, payload: bytes | ZBytes, checksum: bytes | None = None) -> None:
+    """Answer a query with an encoded message and let go of it.
+
+    Args:
+        query: The query.
+        key: Concrete key of what the message tells.
+        payload: The message, neither ``busy`` nor ``refused``.
+        checksum: Its checksum, if that is to go along.
     """
     with query:
-        payload = encode(message)
-        if isinstance(message, Busy | Refused):
-            query.reply_err(payload)
-        else:
-            query.reply(key, payload if memory is None else memory.wrap(payload))
+        query.reply(key, payload, attachment=checksum)
 
 
 def check_question(query: Query) -> None:

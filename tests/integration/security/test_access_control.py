@@ -81,7 +81,7 @@ def test_an_actor_does_not_push_for_all_actors_at_once(network: Network) -> None
 
 @pytest.mark.parametrize("stranger", ["actor-a0", "viewer-v0", "withdrawn"])
 def test_only_a_learner_publishes_parameters(network: Network, stranger: str) -> None:
-    poison, good = (ParametersHead(9, version, "0" * 16, 1, 1) for version in (8, 9))
+    poison, good = (ParametersHead(9, version, 1) for version in (8, 9))
     with (
         network.open("actor-a1") as first,
         heads(first) as heard,

@@ -65,9 +65,9 @@ def test_a_follower_gets_the_newest_parameters(learner: Server, client: Session,
         assert until(lambda: early.newest is not None and early.newest.stamp == (1, 1))
         np.testing.assert_array_equal(early.fetch((1, 1), WAIT_S).vector, np.arange(1000) + 1)
         with open_client(endpoint) as other, ParametersFollower(other, KEYS, threading.Event()) as late:
-            assert until(lambda: late.newest is not None and late.newest.digest == head.digest), "late joiners know"
+            assert until(lambda: late.newest is not None and late.newest.stamp == head.stamp), "late joiners know"
         (answer,) = ask(client, KEYS.params, timeout_s=5.0)
-        assert decode(answer.payload, ParametersHead).digest == head.digest
+        assert decode(answer.payload, ParametersHead).stamp == head.stamp
 
 
 def test_parameters_of_several_shards_are_never_mixed(learner: Server, client: Session) -> None:
@@ -91,7 +91,6 @@ def test_parameters_of_several_shards_are_never_mixed(learner: Server, client: S
         for _ in range(8):
             fetched = follower.fetch(timeout_s=WAIT_S)
             stamps.append(fetched.head.stamp)
-            assert fetched.head.shards == 3
             assert (fetched.vector == fetched.head.version).all()
         stop.set()
         thread.join(WAIT_S)

@@ -3,21 +3,25 @@
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from hoz_dist.nav.rooms import RoomId
 from hoz_dist.waiting import FIRST_TRY_S, LONGER_TRIES
 from hoz_dist.wire.client.epochs import ANOTHER_RUN_S
+from hoz_dist.wire.client.parameters import FAST_S, MOST_UNDER_WAY
 from hoz_dist.wire.protocol.codec import MESSAGES, PROTOCOL_VERSION, checksum, decode, encode
+from hoz_dist.wire.protocol.deltas import Quantised, add
 from hoz_dist.wire.protocol.keys import Keys
 from hoz_dist.wire.protocol.message import SHARD_ELEMENTS, SMALL_BYTES, Message
-from hoz_dist.wire.protocol.parameters import ParametersHead, ParametersShard
+from hoz_dist.wire.protocol.parameters import BLOCK, ParametersDelta, ParametersHead, ParametersShard, digest_of
 from hoz_dist.wire.protocol.rejection import Reason
 from hoz_dist.wire.protocol.rejections import LOG_EVERY_S, MOST_LINES
+from hoz_dist.wire.serving.bases import LONGEST_LIFE
 from hoz_dist.wire.serving.inbox import LONGEST_WAIT_S, MOST_WAITING, MOST_WAITING_BYTES
 from hoz_dist.wire.serving.versions import EXPIRES_S, HELD_S, MOST_BYTES, MOST_READERS, YIELDS_S
 from learner.deduplication import MAX_SENDERS, WINDOW
-from tests.wire_examples import EXAMPLES
+from tests.wire_examples import BASE, EXAMPLES
 
 DOCUMENT = (Path(__file__).parents[3] / "docs" / "wire-protocol.md").read_text(encoding="utf-8")
 
@@ -66,14 +70,25 @@ def test_the_checksum_of_the_gradient_is_the_documented_one() -> None:
 
 
 def test_the_parameters_of_the_examples_belong_together() -> None:
-    head, shard = (decode(encode(one), ParametersHead, ParametersShard) for one in EXAMPLES[6:8])
+    head, shard, delta = EXAMPLES[6:9]
     assert isinstance(head, ParametersHead)
     assert isinstance(shard, ParametersShard)
-    assert head.digest == shard.head.digest == checksum(shard.values.tobytes()).hex()
+    assert isinstance(delta, ParametersDelta)
+    assert head.stamp == shard.head.stamp == delta.head.stamp
+    assert f"`{checksum(encode(shard)).hex()}`" in section("shard")
+    assert delta.base == digest_of(BASE)
+    made = np.empty_like(BASE)
+    add(BASE, Quantised(delta.scales, delta.values), made)
+    np.testing.assert_array_equal(made, shard.values)
 
 
 def test_the_documented_limits_are_those_of_the_code() -> None:
     assert f"shards of {SHARD_ELEMENTS:,} values (512 KiB)" in DOCUMENT
+    assert f"shards of {ParametersDelta.LENGTH:,} values" in DOCUMENT
+    assert f"one for each {BLOCK} values" in DOCUMENT
+    assert f"about every {LONGEST_LIFE} versions" in DOCUMENT
+    assert MOST_UNDER_WAY == 2, "two questions may be without their answer"
+    assert f"longer than {1000 * FAST_S:g} ms" in DOCUMENT
     assert f"{MOST_WAITING} pushes and {MOST_WAITING_BYTES >> 20} MiB wait at the learner" in DOCUMENT
     assert f"one that waits {LONGEST_WAIT_S:g} s" in DOCUMENT
     assert f"for {EXPIRES_S:g} s after the reader got on last" in DOCUMENT

@@ -2,7 +2,9 @@ import pytest
 
 from hoz_dist.errors import InvalidValueError, NotFoundError, UnknownNameError
 from hoz_dist.graph.planner import plan_for
-from hoz_dist.wire.protocol.graphs import plan_of, room_graph_reply, scene_graph_reply
+from hoz_dist.wire.protocol.codec import decode
+from hoz_dist.wire.protocol.graph_messages import RoomGraphReply, SceneGraphReply
+from hoz_dist.wire.protocol.graphs import plan_of
 from hoz_dist.wire.serving.snapshots import Snapshots
 from tests import wire_samples as samples
 
@@ -10,10 +12,8 @@ from tests import wire_samples as samples
 @pytest.fixture
 def snapshots() -> Snapshots:
     snapshots = Snapshots(samples.config_reply(), samples.status_reply, "product")
-    snapshots.graphs = {
-        "kitchen": scene_graph_reply(samples.scene_graph(), 1),
-        "kitchen/3": room_graph_reply(samples.room_graph(), 1),
-    }
+    snapshots.put("kitchen", samples.scene_graph())
+    snapshots.put("kitchen/3", samples.room_graph())
     return snapshots
 
 
@@ -23,8 +23,14 @@ def test_a_plan_is_the_planners(snapshots: Snapshots) -> None:
 
 
 def test_graphs_are_found_by_scene_and_by_room(snapshots: Snapshots) -> None:
-    assert snapshots.graph("kitchen") is snapshots.graphs["kitchen"]
-    assert snapshots.graph("kitchen/3") is snapshots.graphs["kitchen/3"]
+    scene = decode(snapshots.graph("kitchen").payload, SceneGraphReply)
+    assert (scene.scene, scene.version) == ("kitchen", 2)
+    assert str(decode(snapshots.graph("kitchen/3").payload, RoomGraphReply).room) == "kitchen/3"
+
+
+def test_what_is_served_is_the_newest(snapshots: Snapshots) -> None:
+    snapshots.put("kitchen", samples.scene_graph(version=3))
+    assert decode(snapshots.graph("kitchen").payload, SceneGraphReply).version == 3
 
 
 @pytest.mark.parametrize(
