@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import torch
 
+from hoz_dist.a3c.compression.compressor import Compressor
 from hoz_dist.bench.report import Metric
 from hoz_dist.bench.samples import gradient
 from hoz_dist.bench.timing import Contender, Progress, rate, run_contests, seconds_per_call
@@ -68,7 +69,9 @@ def _applying(preset: Preset, codec: Compression, seconds: float) -> Iterator[Ma
     config = RunConfig(preset=preset, compress=codec)
     parameters = initial_parameters(config.policy, config.seed)
     core = LearnerCore(config, parameters)
-    push = GradientPush("a0", 1, 0, core.epoch, 0, config.batch, gradient(parameters.size))
+    vector = gradient(parameters.size)
+    compressed = Compressor(codec, vector.size, config.gradient_norm).compress(vector)
+    push = GradientPush("a0", 1, 0, core.epoch, 0, config.batch, compressed)
 
     def receive() -> _Received:
         payload = encode(replace(push, sequence=core.version, version=core.version))
@@ -81,7 +84,7 @@ def _applying(preset: Preset, codec: Compression, seconds: float) -> Iterator[Ma
         assert any(isinstance(effect, Reply) and isinstance(effect.answer, Accepted) for effect in effects)  # noqa: S101
 
     tensor = torch.from_numpy(parameters.copy())
-    tensor.grad = torch.from_numpy(push.gradient)
+    tensor.grad = torch.from_numpy(vector)
     adam = torch.optim.Adam([tensor], lr=config.learning_rate, betas=BETAS, eps=EPSILON, fused=True)
     name = f"learner_{preset}_{codec}"
     yield {

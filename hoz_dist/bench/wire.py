@@ -7,6 +7,7 @@ from functools import partial
 from itertools import count
 from typing import Final
 
+from hoz_dist.a3c.compression.compressor import Compressor
 from hoz_dist.bench.bare import ask_bare
 from hoz_dist.bench.receiver import EPOCH, KEYS
 from hoz_dist.bench.report import Metric
@@ -74,8 +75,9 @@ def bench_wire(
 def bytes_of_gradient(codec: Compression) -> int:
     """Return the length of a push of a gradient of the paper's size."""
     config = RunConfig(preset="paper", compress=codec)
-    size = initial_parameters(config.policy, config.seed).size
-    return len(encode(_gradient_push(0, size)))
+    vector = gradient(initial_parameters(config.policy, config.seed).size)
+    compressed = Compressor(codec, vector.size, config.gradient_norm).compress(vector)
+    return len(encode(GradientPush(ACTOR, 1, 0, EPOCH, 0, 1, compressed)))
 
 
 @contextmanager
@@ -116,17 +118,13 @@ def _small(endpoint: str, seconds: float) -> Iterator[Mapping[str, Contender]]:
 
 def _pushing(session: Session, memory: SharedMemory, parameters: int) -> Callable[[], None]:
     pusher, sequences = Pusher(session, threading.Event(), memory=memory), count()
-    push = _gradient_push(0, parameters)
+    vector = gradient(parameters)
 
     def work() -> None:
-        message = GradientPush(ACTOR, 1, next(sequences), EPOCH, 0, push.frames, push.gradient)
+        message = GradientPush(ACTOR, 1, next(sequences), EPOCH, 0, 1, vector)
         _check(pusher.push(KEYS.grads(ACTOR), message, DEADLINE_S))
 
     return work
-
-
-def _gradient_push(sequence: int, parameters: int) -> GradientPush:
-    return GradientPush(ACTOR, 1, sequence, EPOCH, 0, 1, gradient(parameters))
 
 
 def _fetch(follower: ParametersFollower) -> None:

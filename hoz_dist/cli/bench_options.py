@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 from click.core import ParameterSource
 
+from hoz_dist.bench.timing import LEAST_REPEATS
 from hoz_dist.cli.options import echo_json, json_option
 
 if TYPE_CHECKING:
@@ -13,14 +14,13 @@ if TYPE_CHECKING:
 
     from hoz_dist.bench.report import Metric, Report
 
-_LEAST_REPEATS: Final = 5
-_PRESETS: Final = ("compact", "paper")
-_CODECS: Final = ("fp32",)
+PRESETS: Final = ("compact", "paper")
+CODECS: Final = ("fp32", "bf16", "int8", "topk")
 
 repeats_option = click.option(
     "--repeats",
-    type=click.IntRange(_LEAST_REPEATS, 1000),
-    default=_LEAST_REPEATS,
+    type=click.IntRange(LEAST_REPEATS, 1000),
+    default=LEAST_REPEATS,
     show_default=True,
     help="Measurements of each figure, of which the median counts; what is compared takes turns.",
 )
@@ -34,18 +34,18 @@ seconds_option = click.option(
 preset_option = click.option(
     "--preset",
     "presets",
-    type=click.Choice(_PRESETS),
+    type=click.Choice(PRESETS),
     multiple=True,
-    default=_PRESETS,
+    default=PRESETS,
     show_default="both",
     help="Sizes of the network; may be repeated.",
 )
 compress_option = click.option(
     "--compress",
     "codecs",
-    type=click.Choice(_CODECS),
+    type=click.Choice(CODECS),
     multiple=True,
-    default=_CODECS,
+    default=CODECS,
     show_default="all",
     help="How the gradient travels; may be repeated.",
 )

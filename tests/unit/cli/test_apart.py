@@ -1,0 +1,54 @@
+"""Work in other processes; what they do is at the top, where they find it."""
+
+import os
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+from hoz_dist.cli.apart import companion, work_apart
+from hoz_dist.errors import HozError, NotFoundError
+
+
+def add_up(numbers: list[int], progress: Callable[[float, float, str], None]) -> tuple[int, str]:
+    progress(1, 2, "half of it")
+    return sum(numbers), os.environ["OMP_WAIT_POLICY"]
+
+
+def fail(progress: Callable[[float, float, str], None]) -> None:
+    del progress
+    raise NotFoundError("There is nothing here.")  # noqa: EM101, TRY003 - a sentence that the test looks for
+
+
+def die(progress: Callable[[float, float, str], None]) -> None:
+    del progress
+    os._exit(7)
+
+
+def serve(begun: Path, ended: Path, ready: Callable[[], None], stopped: Callable[[float], bool]) -> None:
+    begun.touch()
+    ready()
+    while not stopped(10.0):
+        pass
+    ended.touch()
+
+
+def test_work_gets_the_environment_of_actors_and_gives_its_result(capsys: pytest.CaptureFixture[str]) -> None:
+    assert work_apart("Adding", partial(add_up, [1, 2, 3])) == (6, "PASSIVE")
+    assert "OMP_WAIT_POLICY" not in os.environ
+    assert "50%  half of it" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("work", "said"), [(fail, r"There is nothing here\."), (die, "exit status 7")])
+def test_work_that_fails_says_so_in_a_sentence(work: Callable[..., None], said: str) -> None:
+    with pytest.raises(HozError, match=said):
+        work_apart("Working", work)
+
+
+def test_a_companion_serves_until_it_is_told_to_stop(tmp_path: Path) -> None:
+    begun, ended = tmp_path / "begun", tmp_path / "ended"
+    with companion(partial(serve, begun, ended)):
+        assert begun.exists()
+        assert not ended.exists()
+    assert ended.exists()
