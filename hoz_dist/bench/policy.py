@@ -7,7 +7,7 @@ from typing import Final
 
 import torch
 
-from hoz_dist.a3c.loss import LossWeights, a3c_loss
+from hoz_dist.a3c.differentiation import Differentiator
 from hoz_dist.a3c.rollout import Rollout
 from hoz_dist.bench.products import acting_products, run_products, training_products
 from hoz_dist.bench.report import Metric
@@ -96,18 +96,12 @@ def _training(
     guidance = Guidance(*map(torch.stack, zip(*(decision.guidance for decision in decisions), strict=True)))
     values = torch.stack([decision.value for decision in decisions])
     rollout = _rollout(values)
-    scenes = torch.from_numpy(observation.scene)
-    weights = LossWeights(
-        config.discount, config.gae_lambda, config.value_weight, config.entropy_weight, config.scene_weight
-    )
+    differentiator = Differentiator(config, policy, parameters)
 
     def differentiate() -> None:
         if not recorded:
             tape.rewind()
-        unrolled = policy.unroll(observation, start, guidance, bank, tape)
-        loss = a3c_loss(rollout, unrolled.logits, unrolled.values, weights, unrolled.scene_logits, scenes)
-        parameters.gradients.zero_()
-        loss.total.backward()  # type: ignore[no-untyped-call]
+        differentiator.on_policy(rollout, observation, guidance, start, bank, tape)
 
     products = run_products(training_products(policy, steps, batch, recorded=recorded))
     yield {
