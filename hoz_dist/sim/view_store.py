@@ -99,12 +99,8 @@ class ViewStore:
         """
         content = self._load_room(room)
         path, name = self._path(content), _derived_name(encoder)
-        try:
-            folder = ViewFolder.open(path, self._size)
-            arrays = folder.load_derived(name)
-        except DamagedFileError:
-            arrays = None
-        if arrays is None:
+        opened = self._opened_derived(path, name)
+        if opened is None:
             with self._writing(path, progress), Painter(content, self._size) as painter:
                 folder = self._open_or_create(path, painter)
                 # Another process may have been through this while we waited for the lock.
@@ -112,20 +108,20 @@ class ViewStore:
                 if arrays is None:
                     folder.save_derived(name, _derive(folder, painter, content, encoder, progress))
                     arrays = folder.load_derived(name)
-        if arrays is None:
-            raise _unwritable(self._cache, "what was written could not be read back")
-        # A room may hold objects that are targets of other scenes only, such as a chair in a bathroom.
-        asked_for = {category_index(category) for category in SCENE_TARGETS[room.scene]}
-        targets = tuple(target for target in sorted(asked_for) if arrays["success"][:, target].any())
-        return RoomViews(room=room, digest=content.digest, graph=folder.graph, targets=targets, **arrays)
+            if arrays is None:
+                raise _unwritable(self._cache, "what was written could not be read back")
+            opened = folder, arrays
+        return _room_views(content, *opened)
+
+    def find(self, room: RoomId, encoder: VisualEncoder) -> RoomViews | None:
+        """Return a room's views as an encoder sees them if the cache has them all; otherwise None, without delay."""
+        content = self._load_room(room)
+        opened = self._opened_derived(self._path(content), _derived_name(encoder))
+        return None if opened is None else _room_views(content, *opened)
 
     def holds(self, room: RoomId, encoder: VisualEncoder) -> bool:
         """Tell whether `open` would find all of a room in the cache."""
-        try:
-            folder = ViewFolder.open(self._path(self._load_room(room)), self._size)
-        except DamagedFileError:
-            return False
-        return folder.load_derived(_derived_name(encoder)) is not None
+        return self.find(room, encoder) is not None
 
     def frames(self, room: RoomId, views: NDArray[np.integer] | None = None) -> Frames:
         """Return pictures, rendering those positions that the cache lacks.
@@ -173,6 +169,15 @@ class ViewStore:
                     self._opened[room] = self._open_or_create(path, painter)
         return self._opened[room]
 
+    def _opened_derived(self, path: Path, name: str) -> tuple[ViewFolder, dict[str, NDArray[Any]]] | None:
+        """Return a room's folder and what is derived under a name, or None when something is missing or damaged."""
+        try:
+            folder = ViewFolder.open(path, self._size)
+        except DamagedFileError:
+            return None
+        arrays = folder.load_derived(name)
+        return None if arrays is None else (folder, arrays)
+
     def _open_or_create(self, path: Path, painter: Painter) -> ViewFolder:
         """Open a room's folder, or make it; the caller holds the lock."""
         try:
@@ -198,6 +203,13 @@ class ViewStore:
                 yield
         except OSError as error:
             raise _unwritable(self._cache, error.strerror or str(error)) from error
+
+
+def _room_views(room: Room, folder: ViewFolder, arrays: dict[str, NDArray[Any]]) -> RoomViews:
+    # A room may hold objects that are targets of other scenes only, such as a chair in a bathroom.
+    asked_for = {category_index(category) for category in SCENE_TARGETS[room.room.scene]}
+    targets = tuple(target for target in sorted(asked_for) if arrays["success"][:, target].any())
+    return RoomViews(room=room.room, digest=room.digest, graph=folder.graph, targets=targets, **arrays)
 
 
 def _acquired(lock: filelock.BaseFileLock, progress: Progress | None) -> AbstractContextManager[object]:
