@@ -11,13 +11,15 @@ from typing import Any, Final
 
 import msgpack
 
-from hoz_dist.wire.protocol.codec import encode
+from hoz_dist.wire.protocol.bulk import ALIGNMENT
+from hoz_dist.wire.protocol.codec import PROTOCOL_VERSION, encode
 from hoz_dist.wire.protocol.message import Message
 
 Mutation = Callable[[bytes, bytes, random.Random], bytes]
 """From a valid message, another valid one, and a generator of random numbers."""
 
-_VERSIONS: Final = (0, 2, 127, 128, -1, 2**63, 1.0, True, None, "1", [1])
+_V: Final = b"\xa1v" + bytes([PROTOCOL_VERSION])
+_VERSIONS: Final = (0, 1, 3, 127, 128, -1, 2**63, 1.0, True, None, "1", [1])
 _TEXTS: Final = ("", "*", "a/b", "a\nb", "\x00", "x" * 70, "x" * 5000, "kitchen/0", "kitchen/31", "../../etc", "\xe9")
 _NUMBERS: Final = (-1, -(2**63), 2**63, 2**64 - 1, float("nan"), float("inf"), float("-inf"), 0.5, 1e308)
 _SIMPLE: Final = (*_NUMBERS, None, True, False, 0, "", "a0", "x" * 300, b"", b"abc")
@@ -76,48 +78,47 @@ def fields_swapped(data: bytes, other: bytes, rng: random.Random) -> bytes:
         if rng.random() < 0.5:
             first, second = rng.sample(sorted(fields), 2)
             return fields | {first: fields[second], second: fields[first]}
-        strange = msgpack.unpackb(other)
+        strange, _ = split(other)
         return fields | {rng.choice(sorted(fields)): strange[rng.choice(sorted(strange))]}
 
     return _with(data, swapped)
 
 
 def kind_swapped(data: bytes, other: bytes, _: random.Random) -> bytes:
-    return _with(data, lambda fields: fields | {"kind": msgpack.unpackb(other)["kind"]})
+    return _with(data, lambda fields: fields | {"kind": split(other)[0]["kind"]})
 
 
 def other_version(data: bytes, _: bytes, rng: random.Random) -> bytes:
-    return _with(
-        data, lambda fields: fields | {"v": rng.choice((0, 2, 127, 128, -1, 2**63, 1.0, True, None, "1", [1]))}
-    )
+    return _with(data, lambda fields: fields | {"v": rng.choice(_VERSIONS)})
 
 
 def field_twice(data: bytes, _: bytes, rng: random.Random) -> bytes:
     """The same entry in the map two times, which MessagePack can say."""
-    entries = list(msgpack.unpackb(data).items())
+    fields, bulk = split(data)
+    entries = list(fields.items())
     entries.insert(rng.randrange(len(entries) + 1), rng.choice(entries))
-    return _map(entries)
+    return _map(entries) + bulk
 
 
 def huge_length(_: bytes, __: bytes, rng: random.Random) -> bytes:
     """Headers that promise gigabytes."""
     header = rng.choice((b"\xdd", b"\xdf", b"\xc6", b"\xdb", b"\xc9"))
     promise = header + struct.pack(">I", rng.choice((2**32 - 1, 2**31, 2**28, 120_000_000)))
-    return rng.choice((promise, b"\x83\xa1v\x01\xa4kind" + promise, b"\x82\xa1v\x01" + promise)) + rng.randbytes(20)
+    return rng.choice((promise, b"\x83" + _V + b"\xa4kind" + promise, b"\x82" + _V + promise)) + rng.randbytes(20)
 
 
 def deep(data: bytes, _: bytes, rng: random.Random) -> bytes:
     depth = rng.choice((10, 500, 1023, 1024, 5000))
     nested = rng.choice((b"\x91" * depth + b"\xc0", b"\x81\xa1a" * depth + b"\xc0"))
-    entries = [(name, value) for name, value in msgpack.unpackb(data).items() if name not in {"v", "kind"}]
+    entries = [(name, value) for name, value in split(data)[0].items() if name not in {"v", "kind"}]
     name: bytes = msgpack.packb(entries[0][0])
-    return b"\x82\xa1v\x01" + name + nested
+    return b"\x82" + _V + name + nested
 
 
 def many_values(_: bytes, __: bytes, rng: random.Random) -> bytes:
     """A byte for each value, sixty times as much in memory."""
     row = b"\xdc\x0f\xff" + rng.choice((b"\x80", b"\x90", b"\xa0", b"\xc0")) * 4095
-    return b"\x83\xa1v\x01\xa4kind\xa8gradient\xa5extra\x92" + row * 2
+    return b"\x83" + _V + b"\xa4kind\xa8gradient\xa5extra\x92" + row * 2
 
 
 def bad_number(data: bytes, _: bytes, rng: random.Random) -> bytes:
@@ -126,10 +127,7 @@ def bad_number(data: bytes, _: bytes, rng: random.Random) -> bytes:
 
 
 def bad_text(data: bytes, _: bytes, rng: random.Random) -> bytes:
-    text = rng.choice(
-        ("", "*", "a/b", "a\nb", "\x00", "x" * 70, "x" * 5000, "kitchen/0", "kitchen/31", "../../etc", "é")
-    )
-    return _with(data, lambda fields: _replace_somewhere(fields, (str,), text, rng))
+    return _with(data, lambda fields: _replace_somewhere(fields, (str,), rng.choice(_TEXTS), rng))
 
 
 def bad_tensor(data: bytes, _: bytes, rng: random.Random) -> bytes:
@@ -159,6 +157,42 @@ def bad_tensor(data: bytes, _: bytes, rng: random.Random) -> bytes:
     return _with(data, lambda fields: {name: spoil(one) if _is_tensor(one) else one for name, one in fields.items()})
 
 
+def bad_bulk(data: bytes, _: bytes, rng: random.Random) -> bytes:
+    """Bytes behind the map that are cut, moved, filled up with other things than zeros, or that nothing tells of."""
+    fields, bulk = split(data)
+    if not bulk:
+        return data + bytes(ALIGNMENT * rng.randint(1, 3))
+    place = rng.randrange(len(bulk))
+    marked = bulk[:place] + bytes([rng.randrange(1, 256)]) + bulk[place + 1 :]
+    spoilt = (marked, bulk[:-1], bulk[:-ALIGNMENT], bulk[1:], bulk + bytes(1), bulk + bytes(ALIGNMENT), bulk * 2, b"")
+    return joined(fields, rng.choice(spoilt))
+
+
+def bad_gradient(data: bytes, other: bytes, rng: random.Random) -> bytes:
+    """A gradient whose tensors are described as others than they are, or whose numbers do not fit together."""
+    fields, bulk = split(data)
+    gradient = fields.get("gradient")
+    if not isinstance(gradient, dict):
+        return bad_bulk(data, other, rng)
+    name = rng.choice([name for name, value in gradient.items() if isinstance(value, dict)])
+    tensor = gradient[name]
+    number = rng.choice((struct.pack("<f", float("nan")), b"\xff\xff\xff\xff", b"\x80\x7f\x80\x7f", b"\x80" * 4))
+    place = 4 * rng.randrange(len(bulk) // 4)
+    spoilt = (
+        {"codec": rng.choice(("fp32", "bf16", "int8", "topk", "fp64", "", None))},
+        {name: tensor | {"data": bytes(4)}},
+        {name: tensor | {"dtype": rng.choice(("float32", "float64", "bfloat16", "int8", "uint32", "", None))}},
+        {name: tensor | {"shape": rng.choice(([], [0], [-1], [2**62], [True], [1, 1], [tensor["shape"][0] + 1], 3))}},
+        {name: {"dtype": tensor["dtype"]}},
+        {"size": rng.choice((0, 1, 2**40, 1.0))},
+        {},
+    )
+    chosen = rng.choice(spoilt)
+    if not chosen:
+        bulk = bulk[:place] + number + bulk[place + 4 :]
+    return joined(fields | {"gradient": gradient | chosen}, bulk)
+
+
 def random_bytes(_: bytes, __: bytes, rng: random.Random) -> bytes:
     return rng.randbytes(rng.randint(0, 300))
 
@@ -183,6 +217,8 @@ MUTATIONS: Final[tuple[Mutation, ...]] = (
     bad_number,
     bad_text,
     bad_tensor,
+    bad_bulk,
+    bad_gradient,
     random_bytes,
 )
 
@@ -205,9 +241,27 @@ def any_value(rng: random.Random, depth: int = 3) -> Any:
     return {rng.choice(("a", "dtype", "shape", "data")): any_value(rng, depth - 1) for _ in range(rng.randint(0, 4))}
 
 
+def split(data: bytes) -> tuple[dict[str, Any], bytes]:
+    """Return the map of a valid message, and what stands behind it."""
+    unpacker = msgpack.Unpacker()
+    unpacker.feed(data)
+    fields: dict[str, Any] = unpacker.unpack()
+    return fields, data[_aligned(unpacker.tell()) :]
+
+
+def joined(fields: dict[str, Any], bulk: bytes) -> bytes:
+    """Return the message with that map, and that behind it."""
+    head: bytes = msgpack.packb(fields)
+    return head.ljust(_aligned(len(head)), b"\0") + bulk if bulk else head
+
+
+def _aligned(place: int) -> int:
+    return place + -place % ALIGNMENT
+
+
 def _with(data: bytes, change: Callable[[dict[str, Any]], dict[str, Any]]) -> bytes:
-    packed: bytes = msgpack.packb(change(msgpack.unpackb(data)))
-    return packed
+    fields, bulk = split(data)
+    return joined(change(fields), bulk)
 
 
 def _map(entries: list[tuple[str, Any]]) -> bytes:

@@ -163,7 +163,7 @@ def test_a_learner_of_another_protocol_version_is_named(endpoint: str) -> None:
 
         queryable = declare_queryable(session, key, answer)
         with HozClient(endpoint) as client:
-            with pytest.raises(HozError, match="protocol version 9; this side speaks 1"):
+            with pytest.raises(HozError, match="protocol version 9; this side speaks 2"):
                 client.status()
             # A learner of our own version is found all the same.
             with Server(session, KEYS, Snapshots(samples.config_reply(), samples.status_reply, "product")):

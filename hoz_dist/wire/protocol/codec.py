@@ -102,8 +102,9 @@ def decode(data: bytes, *expected: type[M]) -> M:
             bulk = BulkReader(data, length)
             if message.BULK:
                 bulk.attach(message.SPECS, fields)
+            decoded = message.unpack(fields, kind)
             bulk.finish()
-            return message.unpack(fields, kind)  # type: ignore[return-value]  # unpack of a subclass makes that subclass
+            return decoded  # type: ignore[return-value]  # unpack of a subclass makes that subclass
     wanted = " or ".join(message.KIND for message in expected)
     raise RejectedError(Reason.KIND, f"the message is a {shown(kind)}, not a {wanted}")
 

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
+from hoz_dist.config import Compression
 from hoz_dist.wire.protocol.answers import Accepted, Refused
 from hoz_dist.wire.protocol.codec import MESSAGES, PROTOCOL_VERSION, checksum, decode, encode
 from hoz_dist.wire.protocol.message import Message
@@ -16,13 +18,13 @@ from hoz_dist.wire.protocol.pushes import EpisodesPush, GradientPush, RoomGraphP
 from hoz_dist.wire.protocol.rejection import Reason, RejectedError
 from hoz_dist.wire.protocol.run_messages import ConfigReply
 from tests import wire_samples as samples
+from tests.mutations import joined, split
 
 KINDS = tuple(MESSAGES.values())
 
 
 def fields_of(message: Message) -> dict[str, Any]:
-    fields: dict[str, Any] = msgpack.unpackb(encode(message))
-    return fields
+    return split(encode(message))[0]
 
 
 def reason_of(data: bytes, *expected: type[Message]) -> Reason:
@@ -33,8 +35,14 @@ def reason_of(data: bytes, *expected: type[Message]) -> Reason:
 
 
 def altered(message: Message, **fields: object) -> bytes:
-    packed: bytes = msgpack.packb(fields_of(message) | fields)
-    return packed
+    known, bulk = split(encode(message))
+    return joined(known | fields, bulk)
+
+
+def in_gradient(push: GradientPush, bulk: bytes | None = None, **fields: object) -> bytes:
+    """A push with other fields in its gradient, or with other bytes behind its map."""
+    known, behind = split(encode(push))
+    return joined(known | {"gradient": known["gradient"] | fields}, behind if bulk is None else bulk)
 
 
 def test_there_is_a_sample_of_every_kind() -> None:
@@ -62,7 +70,9 @@ def test_values_arrive_as_they_were() -> None:
 
 def test_the_bytes_are_those_of_the_protocol() -> None:
     push = GradientPush("a0", 1, 2, 3, 4, 5, np.array([1.0, -2.0], np.float32))
-    assert msgpack.unpackb(encode(push)) == {
+    data = encode(push)
+    fields, bulk = split(data)
+    assert fields == {
         "v": PROTOCOL_VERSION,
         "kind": "gradient",
         "actor": "a0",
@@ -71,15 +81,31 @@ def test_the_bytes_are_those_of_the_protocol() -> None:
         "epoch": 3,
         "version": 4,
         "frames": 5,
-        "gradient": {"dtype": "float32", "shape": [2], "data": bytes.fromhex("0000803f000000c0")},
+        "gradient": {"codec": "fp32", "values": {"dtype": "float32", "shape": [2]}},
     }
+    assert bulk == bytes.fromhex("0000803f000000c0").ljust(64, b"\0")
+    assert len(data) % 64 == 0
     assert checksum(b"").hex() == "2d06800538d394c2"  # XXH3_64 of nothing, as xxHash states it
 
 
 def test_decoding_a_gradient_does_not_copy_it_again() -> None:
-    decoded = decode(encode(samples.gradient_push()), GradientPush)
-    assert decoded.gradient.base is not None
-    assert not decoded.gradient.flags.writeable
+    data = encode(samples.gradient_push())
+    decoded = decode(data, GradientPush).gradient
+    assert isinstance(decoded, np.ndarray)
+    received = np.frombuffer(data, np.uint8)
+    assert np.shares_memory(decoded, received)
+    assert decoded.ctypes.data - received.ctypes.data == len(data) - 448  # 400 bytes, up to a multiple of 64
+    assert not decoded.flags.writeable
+
+
+@pytest.mark.parametrize("codec", ["bf16", "int8", "topk"])
+def test_a_gradient_of_another_form_arrives_as_it_was(codec: Compression) -> None:
+    sent = samples.gradient_push_in(codec).gradient
+    came = decode(encode(samples.gradient_push_in(codec)), GradientPush).gradient
+    assert type(came) is type(sent)
+    assert not isinstance(came, np.ndarray)
+    for mine, theirs in zip(came, sent, strict=True):
+        np.testing.assert_array_equal(mine, theirs)
 
 
 def test_languages_with_one_type_of_number_may_send_whole_numbers() -> None:
@@ -88,7 +114,34 @@ def test_languages_with_one_type_of_number_may_send_whole_numbers() -> None:
 
 
 PUSH = samples.gradient_push()
-TENSOR = fields_of(PUSH)["gradient"]
+TENSOR = fields_of(PUSH)["gradient"]["values"]
+BULK = split(encode(PUSH))[1]
+HEAD = encode(PUSH)[: -len(BULK)]
+assert HEAD[-1] == 0, "the map is padded"
+HALVES = samples.gradient_push_in("bf16")
+LEVELS = samples.gradient_push_in("int8")
+LARGEST = samples.gradient_push_in("topk")
+
+
+def of(push: GradientPush, name: str) -> dict[str, Any]:
+    tensor: dict[str, Any] = fields_of(push)["gradient"][name]
+    return tensor
+
+
+def padded(*tensors: NDArray[Any]) -> bytes:
+    return b"".join(data + bytes(-len(data) % 64) for data in (tensor.tobytes() for tensor in tensors))
+
+
+def parts_of(push: GradientPush) -> dict[str, NDArray[Any]]:
+    assert not isinstance(push.gradient, np.ndarray)
+    return {name: value for name, value in push.gradient._asdict().items() if isinstance(value, np.ndarray)}
+
+
+def refilled(push: GradientPush, **tensors: NDArray[Any]) -> bytes:
+    """A push with other elements in tensors of its gradient."""
+    return in_gradient(push, padded(*(parts_of(push) | tensors).values()))
+
+
 ROOM_PUSH = samples.MESSAGES[2]
 NODES = fields_of(ROOM_PUSH)["nodes"]
 
@@ -109,13 +162,13 @@ NODES = fields_of(ROOM_PUSH)["nodes"]
         (msgpack.packb({1: 2}), Reason.MALFORMED),
         (b"\x81\xa1\xff\x01", Reason.MALFORMED),
         (msgpack.packb({}), Reason.VERSION),
-        (altered(PUSH, v=2), Reason.VERSION),
+        (altered(PUSH, v=1), Reason.VERSION),
         (altered(PUSH, v=True), Reason.VERSION),
         (altered(PUSH, kind="gradients"), Reason.KIND),
         (altered(PUSH, kind=["gradient"]), Reason.KIND),
         (encode(Accepted(1, 2)), Reason.KIND),
         (altered(PUSH, extra=1), Reason.FIELDS),
-        (msgpack.packb({"v": 1, "kind": "gradient"}), Reason.FIELDS),
+        (msgpack.packb({"v": PROTOCOL_VERSION, "kind": "gradient"}), Reason.FIELDS),
         (altered(PUSH, frames="40"), Reason.TYPE),
         (altered(PUSH, frames=40.0), Reason.TYPE),
         (altered(PUSH, frames=True), Reason.TYPE),
@@ -127,19 +180,52 @@ NODES = fields_of(ROOM_PUSH)["nodes"]
         (altered(PUSH, actor="*"), Reason.NAME),
         (altered(PUSH, actor="x" * 65), Reason.SIZE),
         (altered(PUSH, gradient=b"raw"), Reason.TYPE),
-        (altered(PUSH, gradient=TENSOR | {"order": "F"}), Reason.FIELDS),
-        (altered(PUSH, gradient=TENSOR | {"dtype": "float64"}), Reason.DTYPE),
-        (altered(PUSH, gradient=TENSOR | {"dtype": "object"}), Reason.DTYPE),
-        (altered(PUSH, gradient=TENSOR | {"dtype": ["f4"]}), Reason.DTYPE),
-        (altered(PUSH, gradient=TENSOR | {"data": "text"}), Reason.TYPE),
-        (altered(PUSH, gradient=TENSOR | {"shape": [99]}), Reason.SHAPE),
-        (altered(PUSH, gradient=TENSOR | {"shape": [-100]}), Reason.SHAPE),
-        (altered(PUSH, gradient=TENSOR | {"shape": [10, 10]}), Reason.SHAPE),
-        (altered(PUSH, gradient=TENSOR | {"shape": [True] * 2}), Reason.SHAPE),
-        (altered(PUSH, gradient=TENSOR | {"shape": [2**62, 2**62, 0], "data": b""}), Reason.SHAPE),
-        (altered(PUSH, gradient=TENSOR | {"shape": [0], "data": b""}), Reason.SHAPE),
-        (altered(PUSH, gradient=TENSOR | {"data": np.full(100, np.nan, "<f4").tobytes()}), Reason.NONFINITE),
-        (altered(PUSH, gradient=TENSOR | {"data": np.full(100, -np.inf, "<f4").tobytes()}), Reason.NONFINITE),
+        (altered(PUSH, gradient={}), Reason.FIELDS),
+        (in_gradient(PUSH, codec="fp8"), Reason.NAME),
+        (in_gradient(PUSH, codec=["fp32"]), Reason.TYPE),
+        (in_gradient(PUSH, codec="bf16"), Reason.FIELDS),
+        (in_gradient(PUSH, size=100), Reason.FIELDS),
+        (in_gradient(PUSH, values=BULK), Reason.TYPE),
+        (in_gradient(PUSH, values=TENSOR | {"order": "F"}), Reason.FIELDS),
+        (in_gradient(PUSH, values=TENSOR | {"data": BULK[:400]}), Reason.FIELDS),
+        (in_gradient(PUSH, values=TENSOR | {"dtype": "float64"}), Reason.DTYPE),
+        (in_gradient(PUSH, values=TENSOR | {"dtype": "object"}), Reason.DTYPE),
+        (in_gradient(PUSH, values=TENSOR | {"dtype": ["f4"]}), Reason.DTYPE),
+        (in_gradient(PUSH, values=TENSOR | {"shape": [99]}), Reason.MALFORMED),
+        (in_gradient(PUSH, values=TENSOR | {"shape": [200]}), Reason.MALFORMED),
+        (in_gradient(PUSH, values=TENSOR | {"shape": [50]}), Reason.MALFORMED),
+        (in_gradient(PUSH, values=TENSOR | {"shape": [2**24]}), Reason.MALFORMED),
+        (in_gradient(PUSH, values=TENSOR | {"shape": [2**62]}), Reason.SHAPE),
+        (in_gradient(PUSH, values=TENSOR | {"shape": [-100]}), Reason.SHAPE),
+        (in_gradient(PUSH, values=TENSOR | {"shape": [10, 10]}), Reason.SHAPE),
+        (in_gradient(PUSH, values=TENSOR | {"shape": [True]}), Reason.SHAPE),
+        (in_gradient(PUSH, values=TENSOR | {"shape": [0]}), Reason.SHAPE),
+        (in_gradient(PUSH, BULK + bytes(64)), Reason.MALFORMED),
+        (in_gradient(PUSH, BULK[:-64]), Reason.MALFORMED),
+        (in_gradient(PUSH, BULK[:400]), Reason.MALFORMED),
+        (in_gradient(PUSH, BULK[:-1] + b"\x01"), Reason.MALFORMED),
+        (HEAD[:-1] + b"\x01" + BULK, Reason.MALFORMED),
+        (HEAD + bytes(64) + BULK, Reason.MALFORMED),
+        (in_gradient(PUSH, b""), Reason.MALFORMED),
+        (in_gradient(PUSH, padded(np.full(100, np.nan, "<f4"))), Reason.NONFINITE),
+        (in_gradient(PUSH, padded(np.full(100, -np.inf, "<f4"))), Reason.NONFINITE),
+        (refilled(HALVES, halves=np.full(300, 0x7F80, "<u2")), Reason.NONFINITE),
+        (refilled(HALVES, halves=np.full(300, 0xFFC0, "<u2")), Reason.NONFINITE),
+        (in_gradient(HALVES, halves=of(HALVES, "halves") | {"dtype": "uint16"}), Reason.DTYPE),
+        (refilled(LEVELS, levels=np.full(300, -128, "i1")), Reason.RANGE),
+        (refilled(LEVELS, scales=np.array([1.0, -1.0], "<f4")), Reason.RANGE),
+        (refilled(LEVELS, scales=np.array([1.0, 3e38], "<f4")), Reason.RANGE),
+        (refilled(LEVELS, scales=np.array([1.0, np.nan], "<f4")), Reason.NONFINITE),
+        (in_gradient(LEVELS, scales=of(LEVELS, "scales") | {"shape": [3]}), Reason.SHAPE),
+        (in_gradient(LARGEST, size=0), Reason.RANGE),
+        (in_gradient(LARGEST, size=1), Reason.RANGE),
+        (in_gradient(LARGEST, size=2**40), Reason.RANGE),
+        (in_gradient(LARGEST, size=300.0), Reason.TYPE),
+        (refilled(LARGEST, indices=np.array([7, 7, 9], "<u4")), Reason.RANGE),
+        (refilled(LARGEST, indices=np.array([9, 8, 7], "<u4")), Reason.RANGE),
+        (refilled(LARGEST, indices=np.array([7, 8, 300], "<u4")), Reason.RANGE),
+        (refilled(LARGEST, halves=np.array([1, 2, 0x7F80], "<u2")), Reason.NONFINITE),
+        (in_gradient(LARGEST, halves=of(LARGEST, "halves") | {"shape": [4]}), Reason.SHAPE),
     ],
 )
 def test_what_is_wrong_with_a_gradient_has_a_name(data: bytes, reason: Reason) -> None:
@@ -191,6 +277,10 @@ def test_what_is_wrong_with_an_episode_has_a_name(episode: object, reason: Reaso
 
 def test_a_message_longer_than_its_kind_may_be_is_not_even_read() -> None:
     assert reason_of(bytes(Accepted.MOST_BYTES + 1), Accepted) == Reason.SIZE
+
+
+def test_nothing_may_stand_behind_a_message_without_bulk() -> None:
+    assert reason_of(encode(samples.MESSAGES[1]) + bytes(64), EpisodesPush) == Reason.MALFORMED
 
 
 def test_a_long_list_is_rejected() -> None:
@@ -263,14 +353,14 @@ MSGPACK_VALUES = st.recursive(
 @settings(max_examples=400, deadline=None)
 @given(st.data())
 def test_messages_with_any_field_replaced_are_decoded_or_rejected(data: st.DataObject) -> None:
-    fields = fields_of(data.draw(st.sampled_from(samples.MESSAGES)))
+    fields, bulk = split(encode(data.draw(st.sampled_from(samples.MESSAGES))))
     name = data.draw(st.sampled_from(sorted(fields)))
     inner = fields[name]
     if isinstance(inner, dict) and inner and data.draw(st.booleans()):
         inner = inner | {data.draw(st.sampled_from(sorted(inner))): data.draw(MSGPACK_VALUES)}
     else:
         inner = data.draw(MSGPACK_VALUES)
-    only_rejects(msgpack.packb(fields | {name: inner}), *KINDS)
+    only_rejects(joined(fields | {name: inner}, bulk), *KINDS)
 
 
 @settings(max_examples=300, deadline=None)

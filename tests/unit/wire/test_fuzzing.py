@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hoz_dist.wire.protocol.answers import Refused
-from hoz_dist.wire.protocol.codec import MESSAGES, decode, encode
+from hoz_dist.wire.protocol.codec import MESSAGES, PROTOCOL_VERSION, decode, encode
 from hoz_dist.wire.protocol.message import Message
 from hoz_dist.wire.protocol.rejection import Reason, RejectedError
 from tests import wire_samples as samples
@@ -84,7 +84,7 @@ def test_mutated_messages_with_strange_bytes_inside_are_valid_or_rejected(
 
 def test_what_a_hostile_message_takes_of_memory_is_bounded() -> None:
     tiny = b"\xdc\x0f\xff" + b"\x80" * 4095
-    bomb = b"\x83\xa1v\x01\xa4kind\xa8gradient\xa5extra\xdc\x0f\xff" + tiny * 4095
+    bomb = b"\x83\xa1v" + bytes([PROTOCOL_VERSION]) + b"\xa4kind\xa8gradient\xa5extra\xdc\x0f\xff" + tiny * 4095
     tracemalloc.start()
     assert verdict(bomb, *KINDS) == Reason.SIZE
     _, peak = tracemalloc.get_traced_memory()
