@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from hoz_dist.gradient_forms import Bf16Gradient, Gradient, Int8Gradient, TopKGradient
 from hoz_dist.nav.episode import EpisodeResult
 from hoz_dist.nav.rooms import RoomId
 from hoz_dist.wire.protocol.answers import Accepted, Busy, Refused
@@ -39,8 +40,21 @@ STEPS = Steps(
     reward=rows(np.float32, -0.01, 4.99),
     log_probability=rows(np.float32, -0.5, -0.25),
 )
+
+
+def gradient_push(gradient: Gradient) -> GradientPush:
+    return GradientPush("a0", 7, 2, epoch=2, version=5, frames=40, gradient=gradient)
+
+
+HALVES = np.array([0x3F80, 0xC000], np.uint16)
+GRADIENTS: tuple[GradientPush, ...] = (
+    gradient_push(Bf16Gradient(HALVES)),
+    gradient_push(Int8Gradient(np.array([64, -127], np.int8), np.array([2 / 127], np.float32))),
+    gradient_push(TopKGradient(300, np.array([7, 299], np.uint32), HALVES)),
+)
+"""A gradient of each codec but `fp32`, whose is among the examples of all kinds."""
 EXAMPLES: tuple[Message, ...] = (
-    GradientPush("a0", 7, 2, epoch=2, version=5, frames=40, gradient=np.array([1.0, -2.0], np.float32)),
+    gradient_push(np.array([1.0, -2.0], np.float32)),
     EpisodesPush(
         "a0",
         7,

@@ -2,16 +2,20 @@
 
 import re
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
 
+from hoz_dist.config import Compression
+from hoz_dist.gradient_forms import INT8_BLOCK
 from hoz_dist.nav.rooms import RoomId
 from hoz_dist.waiting import FIRST_TRY_S, LONGER_TRIES
 from hoz_dist.wire.client.epochs import ANOTHER_RUN_S
 from hoz_dist.wire.client.parameters import FAST_S, MOST_UNDER_WAY
 from hoz_dist.wire.protocol.codec import MESSAGES, PROTOCOL_VERSION, checksum, decode, encode
 from hoz_dist.wire.protocol.deltas import Quantised, add
+from hoz_dist.wire.protocol.gradients import GradientField
 from hoz_dist.wire.protocol.keys import Keys
 from hoz_dist.wire.protocol.message import SHARD_ELEMENTS, SMALL_BYTES, Message
 from hoz_dist.wire.protocol.parameters import BLOCK, ParametersDelta, ParametersHead, ParametersShard, digest_of
@@ -21,7 +25,7 @@ from hoz_dist.wire.serving.bases import LONGEST_LIFE
 from hoz_dist.wire.serving.inbox import LONGEST_WAIT_S, MOST_WAITING, MOST_WAITING_BYTES
 from hoz_dist.wire.serving.versions import EXPIRES_S, HELD_S, MOST_BYTES, MOST_READERS, YIELDS_S
 from learner.deduplication import MAX_SENDERS, WINDOW
-from tests.wire_examples import BASE, EXAMPLES
+from tests.wire_examples import BASE, EXAMPLES, GRADIENTS
 
 DOCUMENT = (Path(__file__).parents[3] / "docs" / "wire-protocol.md").read_text(encoding="utf-8")
 
@@ -52,17 +56,40 @@ def test_every_reason_is_documented_and_no_other() -> None:
 
 def test_every_kind_has_an_example() -> None:
     assert sorted(example.KIND for example in EXAMPLES) == sorted(MESSAGES)
-    assert DOCUMENT.count("```hex") == len(EXAMPLES)
+    assert DOCUMENT.count("```hex") == len(EXAMPLES) + len(GRADIENTS)
+
+
+def payloads_in(title: str) -> list[bytes]:
+    blocks = re.findall(r"```hex\n(.*?)```", section(title), re.DOTALL)
+    return [bytes.fromhex("".join(block.split())) for block in blocks]
+
+
+def check(example: Message, payload: bytes) -> None:
+    decoded = decode(payload, type(example))
+    assert encode(decoded) == payload
+    assert encode(example) == payload, "the example in the document is not this one"
 
 
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda example: example.KIND)
 def test_the_examples_are_messages_byte_for_byte(example: Message) -> None:
-    text = section(example.KIND)
-    (block,) = re.findall(r"```hex\n(.*?)```", text, re.DOTALL)
-    payload = bytes.fromhex("".join(block.split()))
-    decoded = decode(payload, type(example))
-    assert encode(decoded) == payload
-    assert encode(example) == payload, "the example in the document is not this one"
+    (payload,) = payloads_in(example.KIND)
+    check(example, payload)
+
+
+def test_so_are_those_of_gradients_of_other_codecs() -> None:
+    for example, payload in zip(GRADIENTS, payloads_in("Gradients of other codecs"), strict=True):
+        check(example, payload)
+
+
+def test_every_codec_and_its_fields_are_documented() -> None:
+    rows = [row.split("|")[1:4] for row in section("gradient").splitlines() if row.startswith("|")]
+    codec, told = "", set()
+    for named, field, _ in rows[rows.index([" `codec` ", " field ", " type "]) + 2 :]:
+        codec = named.strip(" `") or codec
+        told.add((codec, field.strip(" `")))
+    assert told == {(codec, field) for codec, form in GradientField.FORMS.items() for field in form.fields}
+    assert {codec for codec, _ in told} == set(get_args(Compression))
+    assert f"a block is {INT8_BLOCK} numbers" in section("gradient")
 
 
 def test_the_checksum_of_the_gradient_is_the_documented_one() -> None:
