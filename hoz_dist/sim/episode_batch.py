@@ -100,7 +100,7 @@ class EpisodeBatch:
         done = np.flatnonzero(terminated)
         if done.size:
             reward[done] += SUCCESS_REWARD * self._source.succeeds(self.views[done], self._target[done])
-        after = self._transitions.take(self.views)[np.arange(len(actions)), actions]
+        after = self._transitions.pick(self.views, actions)
         np.copyto(self.views, after, where=active)
         np.copyto(self._previous, actions, where=active)
         self._actions += active

@@ -56,3 +56,13 @@ class RowTable(Generic[Scalar]):
             if here.size:
                 taken[here] = block[flat[here] - start]
         return taken.reshape(*indices.shape, *taken.shape[1:])
+
+    def pick(self, indices: NDArray[np.int64], columns: NDArray[np.int64]) -> NDArray[Scalar]:
+        """Return one element of each of M small rows without further axes.
+
+        Args:
+            indices: The rows, [M].
+            columns: Which element of each, [M].
+        """
+        assert self._rows is not None  # noqa: S101 - rows of success and transitions are small
+        return self._rows.ravel().take(indices * self._rows.shape[1] + columns)

@@ -5,6 +5,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from hoz_dist.sim.joined_table import JoinedTable
 from hoz_dist.sim.room_views import RoomViews
 from hoz_dist.sim.row_table import RowTable
 
@@ -41,26 +42,18 @@ class StoredViews:
 
     def __init__(self) -> None:
         """Make a source without rooms."""
-        self._features: RowTable[np.float16] = RowTable()
-        self._detections: RowTable[np.float32] = RowTable()
-        self._appearance: RowTable[np.float16] = RowTable()
+        self._sights = JoinedTable()
         self._success: RowTable[np.bool_] = RowTable()
 
     def add_room(self, views: RoomViews) -> None:
         """Append the views of a room."""
-        self._features.append(views.features)
-        self._detections.append(views.detections)
-        self._appearance.append(views.appearance)
+        self._sights.append(views.features, views.detections, views.appearance)
         self._success.append(views.success)
 
     def look(self, views: NDArray[np.int64]) -> Sight:
         """Look views [...] up."""
-        return Sight(
-            features=self._features.take(views).astype(np.float32),
-            detections=self._detections.take(views),
-            appearance=self._appearance.take(views).astype(np.float32),
-        )
+        return Sight(*self._sights.take(views))
 
     def succeeds(self, views: NDArray[np.int64], targets: NDArray[np.int64]) -> NDArray[np.bool_]:
         """Look up whether Done succeeds at views [M] with targets [M]."""
-        return self._success.take(views)[np.arange(len(views)), targets]
+        return self._success.pick(views, targets)

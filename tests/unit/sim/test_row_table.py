@@ -24,3 +24,13 @@ def test_small_rows_are_copied_and_large_ones_are_not() -> None:
         table.append(block)
         block[1] = 9
         assert bool(table.take(np.array([1]))[0, 0] == 9) is kept
+
+
+def test_picked_elements_are_those_of_the_rows() -> None:
+    rng = np.random.default_rng(0)
+    blocks = [rng.integers(100, size=(rows, 6)) for rows in (4, 9)]
+    table: RowTable[np.int64] = RowTable()
+    for block in blocks:
+        table.append(block)
+    rows, columns = rng.integers(13, size=20), rng.integers(6, size=20)
+    assert np.array_equal(table.pick(rows, columns), np.concatenate(blocks)[rows, columns])
