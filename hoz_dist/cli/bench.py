@@ -14,6 +14,7 @@ import click
 
 from hoz_dist.cli.bench_options import Measure, benchmark_options, compress_option, preset_option, show_metrics
 from hoz_dist.cli.bench_query import query_command
+from hoz_dist.cli.bench_train import train_command
 from hoz_dist.cli.options import cache_option, picture_size_option
 from hoz_dist.nav.categories import SCENES
 from hoz_dist.nav.pose import PICTURE_SIZE
@@ -174,3 +175,4 @@ def _measure(measure: Measure, *arguments: Any, as_json: bool, **keywords: Any) 
 
 
 bench_group.add_command(query_command)
+bench_group.add_command(train_command)

@@ -59,18 +59,26 @@ def benchmark_options(command: Callable[..., Any]) -> Callable[..., Any]:
     return command
 
 
-def show_metrics(metrics: "Mapping[str, Metric]", *, as_json: bool) -> None:
-    """Print what the benchmark that runs found, with the machine and the command."""
+def show_metrics(metrics: "Mapping[str, Metric]", *, as_json: bool, more: "Mapping[str, str] | None" = None) -> None:
+    """Print what the benchmark that runs found, with the machine and the command.
+
+    Args:
+        metrics: The figures.
+        as_json: For scripts.
+        more: What else it found, by name.
+    """
     from rich.console import Console
 
     from hoz_dist.bench.report import Report, this_machine
 
     report = Report(metrics, this_machine(), command_line(click.get_current_context()))
     if as_json:
-        echo_json(report.to_json())
+        echo_json(report.to_json() | dict(more or {}))
         return
     console = Console()
     console.print(_table(report))
+    for name, text in (more or {}).items():
+        console.print(f"{name}: {text}", markup=False, highlight=False)
     console.print(", ".join(f"{name} {value}" for name, value in report.machine.items()), markup=False, highlight=False)
 
 

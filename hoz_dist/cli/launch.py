@@ -9,7 +9,7 @@ from typing import Any, Final
 
 import click
 
-from hoz_dist.cli.processes import Child, Children
+from hoz_dist.cli.processes import ACTOR_NICENESS, Child, Children
 from hoz_dist.cli.progress import Progress
 from hoz_dist.client import HozClient
 from hoz_dist.errors import ConnectionFailedError, HozError
@@ -35,21 +35,30 @@ def launch(run: Path, endpoint: str, learner: Sequence[str], actor: Sequence[str
         KeyboardInterrupt: Stopped by SIGINT or SIGTERM, after the children have stopped cleanly.
     """
     with tempfile.TemporaryDirectory(prefix="hoz-dist-") as logs, Children() as children:
-        options = ["learner", "--listen", endpoint, "--run", str(run), "--exit-when-done", *learner]
-        core = children.start("learner", options, Path(logs) / "learner")
-        client = _connect(endpoint, core)
+        options = ["--exit-when-done", *learner]
+        core = start_learner(children, endpoint, run, options, Path(logs) / "learner")
+        client = connect(endpoint, core)
         if client is None:
             click.echo(f"The run in {run} has used up its budget; another --run trains anew.")
             return
         with client:
             for number in range(actors):
                 name = f"actor-{number}"
-                options = ["actor", "--connect", endpoint, "--name", name, *actor]
-                children.start(name, options, run / f"{name}.log")
+                start_actor(children, endpoint, name, actor, run / f"{name}.log")
             _watch(client, core, children)
 
 
-def _connect(endpoint: str, learner: Child) -> HozClient | None:
+def start_learner(children: Children, endpoint: str, run: Path, options: Sequence[str], log: Path) -> Child:
+    """Start a learner that listens at an endpoint."""
+    return children.start("learner", ["learner", "--listen", endpoint, "--run", str(run), *options], log)
+
+
+def start_actor(children: Children, endpoint: str, name: str, options: Sequence[str], log: Path) -> Child:
+    """Start an actor of the learner at an endpoint."""
+    return children.start(name, ["actor", "--connect", endpoint, "--name", name, *options], log, ACTOR_NICENESS)
+
+
+def connect(endpoint: str, learner: Child) -> HozClient | None:
     """Wait until the learner serves the run; None when it ends at once, because the budget was used up before.
 
     That it answers at its endpoint is not enough: only then does it look whether it may use the run folder.
