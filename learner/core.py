@@ -4,8 +4,9 @@
     for effect in core.handle(GradientReceived(request=7, push=push), now=time.monotonic()):
         ...  # carried out by `learner.serving`
 
-Gradients are applied as they arrive. The parameter version counts the updates; a gradient's lag is how many versions
-the parameters went on since the version that it was computed on.
+Gradients are applied as they arrive; in a run that learns from rollouts, they are computed as those arrive. The
+parameter version counts the updates; the lag of a push is how many versions the parameters went on since the version
+that it was computed or acted on.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -17,10 +18,13 @@ from hoz_dist.errors import InvalidValueError
 from hoz_dist.gradient_forms import Vector
 from hoz_dist.graph.room_graph import RoomGraph
 from hoz_dist.nav.categories import TARGETS
+from hoz_dist.nav.rooms import RoomId
+from hoz_dist.sim.room_views import RoomViews
 from hoz_dist.wire.protocol.answers import Accepted, Busy, Refused
-from hoz_dist.wire.protocol.gradients import codec_of
 from hoz_dist.wire.protocol.pushes import GradientPush, RoomGraphPush
 from hoz_dist.wire.protocol.rejection import Reason, RejectedError
+from hoz_dist.wire.protocol.trajectories import TrajectoryPush
+from learner.admission import Admission
 from learner.checkpoint import Checkpoint
 from learner.clock import TrainingClock
 from learner.deduplication import SeenPushes, Sender
@@ -30,27 +34,27 @@ from learner.events import (
     Event,
     Finish,
     GradientReceived,
+    OpenRoom,
     PublishGraph,
     PublishParameters,
     RecordUpdate,
     Reply,
     RoomGraphReceived,
+    RoomOpened,
     SaveCheckpoint,
     Tick,
+    TrajectoryReceived,
 )
 from learner.graph_store import GraphStore
 from learner.optimizer import NORM_TOLERANCE, FlatAdam, gradient_norm, lag_weight
 from learner.replay import Schedule, UpdateRecord
+from learner.rollout_gradients import Learnt, RolloutGradients
 from learner.statistics import Statistics
 
 LOSS_TERMS: Final = ("policy_loss", "value_loss", "entropy", "scene_loss")
 """Fields of `EpisodesPush` that are recorded for TensorBoard."""
 GRAPH_CHECKPOINT_SECONDS: Final = 2.0
 """A new room graph is saved this soon: rooms are few, and each took an actor a whole exploration."""
-
-
-MOST_NAMED: Final = 20
-"""Recorded actors that are named to one that is not among them."""
 
 
 class LearnerCore:
@@ -65,6 +69,7 @@ class LearnerCore:
         schedule: Recorded updates to repeat.
         checkpoint_seconds: Time between checkpoints.
         keep_every: Frames between checkpoints that are never deleted; None for none but the last.
+        rollouts: Computes the gradients of rollouts, if the run learns from them; made when None.
 
     Raises:
         InvalidValueError: The checkpoint's parameters do not fit the configuration's policy.
@@ -81,6 +86,7 @@ class LearnerCore:
         schedule: Schedule | None = None,
         checkpoint_seconds: float = 30.0,
         keep_every: int | None = None,
+        rollouts: RolloutGradients | None = None,
     ) -> None:
         self.config = config
         self.epoch = epoch
@@ -100,6 +106,11 @@ class LearnerCore:
         if checkpoint is not None:
             self._resume(checkpoint, room_digests or {})
         self._kept = self._milestone
+        self._admission = Admission(config, epoch, self._optimizer.size, schedule)
+        self._rollouts: RolloutGradients | None = None
+        if config.learn_from == "rollouts":
+            self._rollouts = rollouts or RolloutGradients(config)
+            self._rollouts.begin(epoch, self._optimizer.tensor, self.graphs.scenes.values())
 
     # --- what the shell reads ---
 
@@ -169,6 +180,13 @@ class LearnerCore:
             "actors": {process: actor.summary(now) for process, actor in statistics.actors.items()},
         }
 
+    def rooms_to_open(self) -> list[RoomId]:
+        """Return the rooms whose views this run needs, as far as it knows, and that are not open."""
+        if self._rollouts is None:
+            return []
+        rooms = map(RoomId.parse, self.graphs.rooms)
+        return [room for room in rooms if not self._rollouts.has_room(room)]
+
     # --- what the shell tells ---
 
     def handle(self, event: Event, now: float) -> list[Effect]:
@@ -188,6 +206,10 @@ class LearnerCore:
                 effects = self._episodes(event, now)
             case RoomGraphReceived(request, push):
                 effects = self._room_graph(request, push, now)
+            case TrajectoryReceived(request, push):
+                effects = self._trajectory(request, push, now)
+            case RoomOpened(views):
+                effects = self._room_opened(views)
             case Tick():
                 effects = iter(())
         return [*effects, *self._housekeeping(now)]
@@ -197,7 +219,7 @@ class LearnerCore:
         if (sender, push.sequence) in self._seen:
             yield self._repeated(request)
             return
-        refusal = self._refusal(push)
+        refusal = self._admission.refusal(push, self.version, finished=self.finished)
         if refusal is not None:
             yield self._refuse(request, *refusal)
             return
@@ -210,49 +232,50 @@ class LearnerCore:
         if self._schedule is not None and self._schedule.turn(push.actor, push.sequence) == "later":
             yield Reply(request, Busy(self.epoch))
             return
-        yield from self._apply(sender, push, vector, now)
+        weight = lag_weight(self.version - push.version)
+        yield from self._apply(sender, push, Learnt(vector, push.frames), weight, now)
         yield PublishParameters()
         yield Reply(request, self._accepted())
 
-    def _refusal(self, push: GradientPush) -> tuple[Reason, str] | None:
-        """Return why a gradient cannot be used, as reason and detail; None when it can, unless it is too long.
+    def _trajectory(self, request: int, push: TrajectoryPush, now: float) -> Iterator[Effect]:
+        sender = Sender("trajectory", push.actor, push.incarnation)
+        if (sender, push.sequence) in self._seen:
+            yield self._repeated(request)
+            return
+        refusal = self._admission.refusal(push, self.version, finished=self.finished)
+        if refusal is not None:
+            yield self._refuse(request, *refusal)
+            return
+        assert self._rollouts is not None  # noqa: S101 - otherwise it was refused
+        missing = self._rollouts.missing(push)
+        if missing or (self._schedule is not None and self._schedule.turn(push.actor, push.sequence) == "later"):
+            yield from map(OpenRoom, missing)
+            yield Reply(request, Busy(self.epoch))
+            return
+        try:
+            learnt = self._rollouts.learn(push)
+        except RejectedError as error:
+            yield self._refuse(request, error.reason, error.detail)
+            return
+        if learnt.loss is not None:
+            self.statistics.losses = learnt.loss.terms()
+        # V-trace has accounted for the lag already, and the gradient is of the parameters as they are.
+        yield from self._apply(sender, push, learnt, 1.0, now)
+        yield PublishParameters()
+        yield Reply(request, self._accepted())
 
-        Its entries are finite: a message with others cannot be made.
-        """
-        lag, size = self.version - push.version, self._optimizer.size
-        codec, wanted = codec_of(push.gradient), self.config.compress
-        most_frames = self.config.batch * self.config.rollout_steps
-        schedule = self._schedule
-        stranger = schedule is not None and push.actor not in schedule.actors
-        unknown = schedule is not None and schedule.turn(push.actor, push.sequence) == "never"
-        recorded = ", ".join(schedule.actors[:MOST_NAMED]) if schedule is not None else ""
-        checks = (
-            (self.finished, Reason.FINISHED, "the budget is used up"),
-            (
-                stranger,
-                Reason.NAME,
-                f"the recorded run has no actor '{push.actor}'; start one actor --name for each of: {recorded}",
-            ),
-            (push.epoch != self.epoch, Reason.EPOCH, f"computed in epoch {push.epoch}, now is {self.epoch}"),
-            (lag < 0, Reason.STALE, f"computed on version {push.version}, the newest is {self.version}"),
-            (lag > self.config.max_lag, Reason.STALE, f"{lag} versions behind, the bound is {self.config.max_lag}"),
-            (push.gradient.size != size, Reason.SHAPE, f"{push.gradient.size} entries for {size} parameters"),
-            (codec != wanted, Reason.CODEC, f"the gradient travels as {codec}; the run's do as {wanted}"),
-            (push.frames > most_frames, Reason.RANGE, f"{push.frames} frames; a rollout has at most {most_frames}"),
-            (unknown, Reason.STALE, f"sequence {push.sequence} was not applied in the recorded run"),
-        )
-        return next(((reason, detail) for wrong, reason, detail in checks if wrong), None)
-
-    def _apply(self, sender: Sender, push: GradientPush, vector: Vector, now: float) -> Iterator[Effect]:
+    def _apply(
+        self, sender: Sender, push: GradientPush | TrajectoryPush, learnt: Learnt, weight: float, now: float
+    ) -> Iterator[Effect]:
         lag = self.version - push.version
         self._clock.push(now)
         self._optimizer.set_progress(self.progress(now) or 0.0)
         if self._schedule is not None:
             self._optimizer.learning_rate = self._schedule.take(push.version)
-        self._optimizer.step(vector, lag_weight(lag))
+        self._optimizer.step(learnt.gradient, weight)
         self._seen.add(sender, push.sequence)
         self.version += 1
-        self.statistics.applied(push.actor, push.incarnation, push.frames, lag, now)
+        self.statistics.applied(push.actor, push.incarnation, learnt.frames, lag, now)
         self._save_within(self._checkpoint_seconds, now)
         yield RecordUpdate(
             UpdateRecord(push.actor, push.incarnation, push.sequence, push.version, lag, self._optimizer.learning_rate)
@@ -266,7 +289,8 @@ class LearnerCore:
             return
         self._seen.add(sender, push.sequence)
         actor = self.statistics.actor(push.actor, push.incarnation, now)
-        self.statistics.losses = {name: getattr(push, name) for name in LOSS_TERMS}
+        if self._rollouts is None:  # otherwise this process computes the losses itself
+            self.statistics.losses = {name: getattr(push, name) for name in LOSS_TERMS}
         for episode in push.episodes:
             actor.rooms.add(str(episode.room))
             self.statistics.finished(episode.room.scene, success=episode.success)
@@ -295,7 +319,16 @@ class LearnerCore:
         if changed:
             self._save_within(min(GRAPH_CHECKPOINT_SECONDS, self._checkpoint_seconds), now)
             yield PublishGraph(push.room)
+        if self._rollouts is not None:
+            self._rollouts.use_graph(self.graphs.scenes[push.room.scene])
+            if not self._rollouts.has_room(push.room):
+                yield OpenRoom(push.room)
         yield Reply(request, self._accepted())
+
+    def _room_opened(self, views: RoomViews) -> Iterator[Effect]:
+        if self._rollouts is not None:
+            self._rollouts.add_room(views)
+        return iter(())
 
     def _repeated(self, request: int) -> Reply:
         self.statistics.duplicates += 1

@@ -3,8 +3,10 @@
 from dataclasses import dataclass
 
 from hoz_dist.nav.rooms import RoomId
+from hoz_dist.sim.room_views import RoomViews
 from hoz_dist.wire.protocol.answers import Accepted, Busy, Refused
 from hoz_dist.wire.protocol.pushes import EpisodesPush, GradientPush, RoomGraphPush
+from hoz_dist.wire.protocol.trajectories import TrajectoryPush
 from learner.replay import UpdateRecord
 
 # Events. `request` names the request that a `Reply` answers; the shell chooses it.
@@ -35,11 +37,26 @@ class RoomGraphReceived:
 
 
 @dataclass(frozen=True, slots=True)
+class TrajectoryReceived:
+    """An actor pushed a rollout to learn from."""
+
+    request: int
+    push: TrajectoryPush
+
+
+@dataclass(frozen=True, slots=True)
+class RoomOpened:
+    """The views of a room are there."""
+
+    views: RoomViews
+
+
+@dataclass(frozen=True, slots=True)
 class Tick:
     """Time went by."""
 
 
-Event = GradientReceived | EpisodesReceived | RoomGraphReceived | Tick
+Event = GradientReceived | EpisodesReceived | RoomGraphReceived | TrajectoryReceived | RoomOpened | Tick
 
 # Effects.
 
@@ -65,6 +82,13 @@ class PublishGraph:
 
 
 @dataclass(frozen=True, slots=True)
+class OpenRoom:
+    """Get the views of a room, to learn from rollouts in it; asked for again while they are not there."""
+
+    room: RoomId
+
+
+@dataclass(frozen=True, slots=True)
 class RecordUpdate:
     """Write an applied update to the record."""
 
@@ -83,4 +107,4 @@ class Finish:
     """The budget is used up, or the recorded updates are all repeated; asked for once."""
 
 
-Effect = Reply | PublishParameters | PublishGraph | RecordUpdate | SaveCheckpoint | Finish
+Effect = Reply | PublishParameters | PublishGraph | OpenRoom | RecordUpdate | SaveCheckpoint | Finish

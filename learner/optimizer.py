@@ -77,6 +77,11 @@ class FlatAdam:
         view.flags.writeable = False
         return view
 
+    @property
+    def tensor(self) -> torch.Tensor:
+        """The parameters, [P], where the next step changes them."""
+        return self._tensor
+
     def set_progress(self, progress: float) -> None:
         """Set the learning rate to ``base * (1 - progress)``; progress is the share of the budget used."""
         self.learning_rate = self.base_learning_rate * (1.0 - min(max(progress, 0.0), 1.0))

@@ -27,6 +27,8 @@ from learner.core import LearnerCore
 from learner.leadership import DeposedError, Leadership
 from learner.log_file import logged_to
 from learner.replay import Schedule, read_updates
+from learner.rollout_gradients import RolloutGradients
+from learner.rooms import RoomSource
 from learner.run_folder import RunFolder
 from learner.serving import Learner
 from learner.standby import RETRY_S, ReadAhead, follow
@@ -69,6 +71,8 @@ class LearnerSettings:
     """Frames between checkpoints that are never deleted; None for none but the last."""
     replay: Path | None = None
     """Recorded updates to repeat."""
+    rooms: RoomSource | None = None
+    """Where the views of rooms come from; needed by a run that learns from rollouts."""
     exit_when_done: bool = False
     """Return when the budget is used up; otherwise graphs go on being served."""
 
@@ -104,6 +108,8 @@ class _Cores:
         self._records = read_updates(settings.replay) if settings.replay is not None else None
         self._initial = initial_parameters(settings.config.policy, settings.config.seed)
         self._room_digests = catalogue_digests()
+        config = settings.config
+        self._rollouts = RolloutGradients(config) if config.learn_from == "rollouts" else None
         # For nothing but to have it done: with the first optimizer torch imports seconds' worth of modules, with
         # the first merge of rooms comes scipy.optimize, and nobody shall wait for them who waits for a leader.
         self.make(0, None)
@@ -121,6 +127,7 @@ class _Cores:
             schedule=Schedule(self._records, applied) if self._records is not None else None,
             checkpoint_seconds=self._settings.checkpoint_seconds,
             keep_every=self._settings.keep_every,
+            rollouts=self._rollouts,
         )
 
 
@@ -199,7 +206,9 @@ class _Turns:
                 *(self._keys.run, core.epoch, core.version, core.parameters.size),
                 f"listening at {settings.listen}" if settings.listen else f"connected to {settings.connect}",
             )
-            with Learner(core, run, self._session, self._keys, self._members, me, self._memory) as learner:
+            with Learner(
+                core, run, self._session, self._keys, self._members, me, self._memory, settings.rooms
+            ) as learner:
                 learner.run(stop, exit_when_done=settings.exit_when_done)
             return learner.deposed
 

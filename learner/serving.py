@@ -15,6 +15,7 @@ from typing import Final, Self
 from hoz_dist.graph.room_graph import RoomGraph
 from hoz_dist.graph.scene_graph import SceneGraph
 from hoz_dist.nav.categories import TARGETS
+from hoz_dist.nav.rooms import RoomId
 from hoz_dist.outage import Outage
 from hoz_dist.stages import StageClock
 from hoz_dist.wire.membership.liveliness import Member, Members
@@ -24,6 +25,7 @@ from hoz_dist.wire.protocol.pushes import EpisodesPush, GradientPush, RoomGraphP
 from hoz_dist.wire.protocol.rejection import Reason
 from hoz_dist.wire.protocol.rejections import Rejections
 from hoz_dist.wire.protocol.run_messages import ConfigReply, StatusReply
+from hoz_dist.wire.protocol.trajectories import TrajectoryPush, most_bytes
 from hoz_dist.wire.serving.inbox import Inbox, Request
 from hoz_dist.wire.serving.parameters import ParametersPublisher
 from hoz_dist.wire.serving.server import Server
@@ -39,17 +41,21 @@ from learner.events import (
     Event,
     Finish,
     GradientReceived,
+    OpenRoom,
     PublishGraph,
     PublishParameters,
     RecordUpdate,
     Reply,
     RoomGraphReceived,
+    RoomOpened,
     SaveCheckpoint,
     Tick,
+    TrajectoryReceived,
 )
 from learner.leadership import DeposedError
 from learner.membership import left_processes, live_processes
 from learner.recorder import ScalarRecorder, UpdateLog
+from learner.rooms import RoomOpener, RoomSource
 from learner.run_folder import LedRun
 
 TICK_S: Final = 0.1
@@ -79,6 +85,7 @@ class Learner:
         members: Who takes part.
         me: This process, as the others see it.
         memory: Shared memory for parameters.
+        rooms: Where the views of rooms come from, if the run learns from rollouts.
     """
 
     def __init__(
@@ -90,6 +97,7 @@ class Learner:
         members: Members,
         me: Member,
         memory: SharedMemory | None = None,
+        rooms: RoomSource | None = None,
     ) -> None:
         self._core = core
         self._leadership = run.leadership
@@ -106,6 +114,9 @@ class Learner:
         self._updates_disk = Outage(_log, "cannot record updates (%s); training on", "updates are recorded again")
         self._scalars_disk = Outage(_log, "cannot log to TensorBoard (%s); training on", "logging to TensorBoard again")
         with ExitStack() as stack:
+            self._rooms = stack.enter_context(RoomOpener(rooms)) if rooms is not None else None
+            for room in core.rooms_to_open():
+                self._open_room(room)
             self._updates = UpdateLog(run.updates)
             stack.callback(self._updates.close)
             self._checkpoints = CheckpointWriter(
@@ -131,6 +142,7 @@ class Learner:
                     graphs=graphs,
                     inbox=self._inbox,
                     parameters=core.parameters.size,
+                    rollout_bytes=most_bytes(core.config.batch, core.config.rollout_steps),
                     clock=self._clock,
                 )
             )
@@ -157,6 +169,8 @@ class Learner:
             # After the wait, and before the push is handled: this process may have stood still in between.
             if not self._leads(now):
                 return
+            for views in self._rooms.opened() if self._rooms is not None else ():
+                self._carry_out(self._core.handle(RoomOpened(views), now), None, now)
             if request is None:
                 self._carry_out(self._core.handle(Tick(), now), None, now)
             else:
@@ -213,6 +227,8 @@ class Learner:
                 case PublishGraph(room):
                     self._server.put_graph(self._core.graphs.rooms[str(room)])
                     self._server.put_graph(self._core.graphs.scenes[room.scene])
+                case OpenRoom(room):
+                    self._open_room(room)
                 case RecordUpdate(record):
                     with self._clock("record"):
                         self._updates.write(record)
@@ -222,6 +238,10 @@ class Learner:
                 case Finish():
                     _log.info("the run is over at version %d; its last checkpoint will be kept", self._core.version)
                     self._done_since = now
+
+    def _open_room(self, room: RoomId) -> None:
+        if self._rooms is not None:
+            self._rooms.want(room)
 
     def _publish_parameters(self) -> None:
         with self._clock("publish"):
@@ -298,5 +318,7 @@ def _event_of(request: Request) -> Event:
             return EpisodesReceived(0, push)
         case RoomGraphPush() as push:
             return RoomGraphReceived(0, push)
+        case TrajectoryPush() as push:
+            return TrajectoryReceived(0, push)
         case push:
             raise TypeError(push)

@@ -1,5 +1,6 @@
 """From a rollout to the gradient of its loss by the flat parameters."""
 
+from functools import cached_property
 from typing import NamedTuple
 
 import torch
@@ -14,7 +15,7 @@ from hoz_dist.policy.actor_critic import ActorCritic, State, Unrolled
 from hoz_dist.policy.graph_bank import GraphBank
 from hoz_dist.policy.navigator import Guidance
 from hoz_dist.policy.parameters import FlatParameters
-from hoz_dist.policy.recurrent import Tape
+from hoz_dist.policy.tape import Tape
 
 
 class Behaviour(NamedTuple):
@@ -47,6 +48,7 @@ class Differentiator:
         self._policy = policy
         self._parameters = parameters
         self._largest_norm = config.gradient_norm
+        self._size = config.rollout_steps, config.batch
         self._weights = LossWeights(
             discount=config.discount,
             gae_lambda=config.gae_lambda,
@@ -82,7 +84,7 @@ class Differentiator:
         """Compute the gradient of a rollout that was acted on other parameters.
 
         Args:
-            behaviour: T steps of B episodes.
+            behaviour: T steps of B episodes, as many as in the configuration.
             observation: What was observed at them, and after the last one, [T + 1, B, ...].
             guidance: What was decided besides the actions, [T + 1, B].
             start: State before the first step.
@@ -94,7 +96,8 @@ class Differentiator:
         steps = len(behaviour.actions)
         seen, after = (Observation(*(part[rows] for part in observation)) for rows in _split(steps))
         guided, guided_after = (Guidance(*(part[rows] for part in guidance)) for rows in _split(steps))
-        unrolled = self._policy.unroll(seen, start, guided, bank)
+        self._tape.rewind()
+        unrolled = self._policy.unroll(seen, start, guided, bank, self._tape)
         with torch.no_grad():
             bootstrap = self._policy.unroll(after, unrolled.state, guided_after, bank).values[0]
         rollout = Rollout(
@@ -108,6 +111,11 @@ class Differentiator:
             log_probabilities=behaviour.log_probabilities,
         )
         return self._descend(rollout, unrolled, seen), unrolled.state
+
+    @cached_property
+    def _tape(self) -> Tape:
+        """Memory for rollouts that were not recorded when they were acted."""
+        return self._policy.tape(*self._size)
 
     def _descend(self, rollout: Rollout, unrolled: Unrolled, observation: Observation) -> Loss:
         """Compute the loss and its gradient, clipped."""

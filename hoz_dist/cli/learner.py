@@ -6,14 +6,16 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from hoz_dist.cli.connecting import keys_option, shared_memory_option
-from hoz_dist.cli.options import keep_every_option
+from hoz_dist.cli.options import cache_option, keep_every_option
 from hoz_dist.cli.run_options import run_config, run_options
 from hoz_dist.cli.stopping import stop_on_signals
 from hoz_dist.errors import InvalidValueError
 from hoz_dist.wire.transport.endpoint import DEFAULT_ENCRYPTED_ENDPOINT, DEFAULT_ENDPOINT
 
 if TYPE_CHECKING:
+    from hoz_dist.config import RunConfig
     from hoz_dist.wire.transport.credentials import Credentials
+    from learner.rooms import RoomSource
 
 
 @click.command("learner")
@@ -60,6 +62,7 @@ if TYPE_CHECKING:
     type=click.Path(path_type=Path),
     help="The updates folder of a run: apply exactly these updates, in this order.  [default: as gradients arrive]",
 )
+@cache_option
 @click.option(
     "--exit-when-done", is_flag=True, help="Exit when the budget is used up.  [default: go on serving graphs]"
 )
@@ -73,6 +76,7 @@ def learner_command(
     checkpoint_seconds: float,
     keep_every: int | None,
     replay: Path | None,
+    cache: Path | None,
     *,
     standby: bool,
     shared_memory: bool,
@@ -116,6 +120,7 @@ def learner_command(
         checkpoint_seconds=checkpoint_seconds,
         keep_every=keep_every,
         replay=replay,
+        rooms=_rooms(config, choices["weights"], cache) if config.learn_from == "rollouts" else None,
         exit_when_done=exit_when_done,
     )
     console = logging.StreamHandler()
@@ -124,6 +129,21 @@ def learner_command(
     logging.basicConfig(level=logging.INFO, handlers=[console])
     stop = stop_on_signals()
     serve(settings, stop)
+
+
+def _rooms(config: "RunConfig", weights: Path | None, cache: Path | None) -> "RoomSource":
+    """Return where the learner sees what actors saw."""
+    from hoz_dist.cli.rendering import Encoding, render_rooms
+    from hoz_dist.evaluation.loading import matching_encoder
+    from hoz_dist.sim.view_store import ViewStore, default_cache
+    from learner.rooms import RoomSource
+
+    folder, size, encoding = cache or default_cache(), config.picture_size, Encoding(config.encoder, weights)
+    return RoomSource(
+        ViewStore(folder, size),
+        matching_encoder(config, weights),
+        render=lambda room: render_rooms([room], folder, size, 1, encoding),
+    )
 
 
 def _identity(keys: Path | None, name: str | None, role: str) -> "tuple[Credentials | None, str]":

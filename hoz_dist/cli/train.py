@@ -68,7 +68,7 @@ def train_command(
     files = {"weights": choices["weights"], "cache": cache}
     actor = as_arguments({"scene": scenes or SCENES, **files})
 
-    learner = as_arguments(choices | {"keep_every": keep_every})
+    learner = as_arguments(choices | {"keep_every": keep_every, "cache": cache})
 
     launch(run, free_endpoint(), learner, actor, actors)
 

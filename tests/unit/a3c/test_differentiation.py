@@ -63,7 +63,7 @@ class Acted:
 
 @pytest.mark.parametrize("method", ["a3c", "hoz"])
 def test_on_the_same_parameters_both_ways_give_the_same_gradient(method: Method) -> None:
-    acted = Acted(RunConfig(method=method, gradient_norm=1e6))
+    acted = Acted(RunConfig(batch=BATCH, rollout_steps=STEPS, method=method, gradient_norm=1e6))
     expected = acted.on_policy(acted.rollout)
     found, state = acted.off_policy(acted.behaviour)
     assert expected.norm() > 0.1
@@ -73,7 +73,11 @@ def test_on_the_same_parameters_both_ways_give_the_same_gradient(method: Method)
 
 
 def test_what_another_policy_did_more_often_than_this_one_would_counts_less() -> None:
-    acted = Acted(RunConfig(gradient_norm=1e6, entropy_weight=0.0, scene_weight=0.0, value_weight=0.0))
+    acted = Acted(
+        RunConfig(
+            batch=BATCH, rollout_steps=STEPS, gradient_norm=1e6, entropy_weight=0.0, scene_weight=0.0, value_weight=0.0
+        )
+    )
     on_policy, _ = acted.off_policy(acted.behaviour)
     certain = acted.behaviour._replace(log_probabilities=torch.zeros(STEPS, BATCH))
     found, _ = acted.off_policy(certain)
@@ -81,7 +85,7 @@ def test_what_another_policy_did_more_often_than_this_one_would_counts_less() ->
 
 
 def test_a_rollout_of_which_nothing_is_learnt_still_has_a_gradient() -> None:
-    acted = Acted(RunConfig(scene_weight=0.0))
+    acted = Acted(RunConfig(batch=BATCH, rollout_steps=STEPS, scene_weight=0.0))
     nothing = acted.behaviour._replace(valid=torch.zeros(STEPS, BATCH, dtype=torch.bool))
     found, _ = acted.off_policy(nothing)
     torch.testing.assert_close(found, torch.zeros_like(found))
