@@ -1,10 +1,8 @@
 """What each codec sends of a vector.
 
-A codec takes out of a vector what travels, and leaves the rest: after `Codec.take` the vector is what it was less what
-the receiver will see. `hoz_dist.a3c.compression.compressor` adds that rest to the next gradient, so that nothing is
-lost but what the bound of the norm cuts off.
-
-The learner refuses gradients whose norm is above the run's bound, so what a codec makes of a vector never is.
+A codec takes out of a vector what travels, and leaves the rest, which `hoz_dist.a3c.compression.compressor` adds to the
+next gradient. The learner refuses gradients whose norm is above the run's bound. So what a codec makes of a vector
+never is: it is scaled down, and what that cuts off is lost, as it is without a codec.
 """
 
 from typing import Final, Protocol
@@ -19,8 +17,6 @@ from hoz_dist.gradient_forms import INT8_BLOCK, Bf16Gradient, Gradient, Int8Grad
 
 TOP_SHARE: Final = 0.01
 """Share of the entries that `TopK` sends."""
-MOST_KEPT: Final = 100.0
-"""Largest norm of what `TopK` keeps, in bounds of the norm; see docs/decisions/gradient-codecs.md."""
 _BF16_ROUNDS_UP: Final = 1.0 + 2.0**-8
 """Rounding to 8 significant bits makes no number larger than by this factor."""
 _LEVELS: Final = 127.0
@@ -58,7 +54,7 @@ class Bf16:
         self._halves = torch.empty(size, dtype=torch.bfloat16)
 
     def take(self, vector: Tensor, largest: float) -> Bf16Gradient:
-        """See `Codec.take`. What exceeds the norm is not left but cut off, as without a codec."""
+        """See `Codec.take`."""
         clip_norm(vector, largest / _BF16_ROUNDS_UP)
         self._halves.copy_(vector)
         vector.sub_(self._halves)
@@ -80,7 +76,7 @@ class Int8:
         self._scales = torch.empty(blocks_of(size), 1)
 
     def take(self, vector: Tensor, largest: float) -> Int8Gradient:
-        """See `Codec.take`. What exceeds the norm is not left but cut off, as without a codec."""
+        """See `Codec.take`."""
         clip_norm(vector, largest)
         sent = self._padded.view(-1)[: self._size]
         sent.copy_(vector)
@@ -103,8 +99,9 @@ class Int8:
 class TopK:
     """Sends the entries of the largest magnitude, `TOP_SHARE` of all, as bfloat16.
 
-    What exceeds the norm is left for later too, since what is sent is the sum of many gradients. So that what is left
-    stays bounded even if it only ever grew, it is scaled down to `MOST_KEPT` times the bound.
+    The largest 1% hold at least 1% of the sum of squares, so what is left of gradients no longer than the bound of the
+    norm never grows longer than some 200 times the bound. What is sent of an entry that is scaled down leaves the
+    vector in full: else the same entries would be the largest again and again.
 
     Args:
         size: P.
@@ -123,8 +120,7 @@ class TopK:
         chosen = torch.from_numpy(values[indices])
         clip_norm(chosen, largest / _BF16_ROUNDS_UP)
         halves = chosen.to(torch.bfloat16)
-        values[indices] -= halves.float().numpy()
-        clip_norm(vector, MOST_KEPT * largest)
+        values[indices] = (chosen - halves).numpy()
         return TopKGradient(values.size, indices.astype(np.uint32), _bits(halves))
 
     def _largest(self, values: NDArray[np.float32]) -> NDArray[np.int64]:

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoz_dist.config import RunConfig
+from hoz_dist.gradient_forms import Gradient
 from hoz_dist.graph.room_graph import RoomGraph
 from hoz_dist.nav.categories import TARGETS
 from hoz_dist.nav.episode import EpisodeResult
@@ -34,7 +35,7 @@ def gradient(
     epoch: int = 1,
     version: int = 0,
     frames: int = 10,
-    values: Float32 | None = None,
+    values: Gradient | None = None,
 ) -> GradientPush:
     values = vector(sequence) if values is None else values
     return GradientPush(

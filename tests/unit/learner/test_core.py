@@ -6,8 +6,11 @@ import numpy as np
 import pytest
 import torch
 
-from hoz_dist.config import RunConfig
+from hoz_dist.a3c.compression.compressor import Compressor
+from hoz_dist.a3c.compression.decompressor import Decompressor
+from hoz_dist.config import Compression, RunConfig
 from hoz_dist.errors import InvalidValueError
+from hoz_dist.gradient_forms import Bf16Gradient, TopKGradient
 from hoz_dist.nav.categories import TARGETS
 from hoz_dist.wire.protocol.answers import Accepted, Busy, Refused
 from hoz_dist.wire.protocol.pushes import GradientPush
@@ -121,8 +124,12 @@ def test_a_gradient_at_the_bound_of_its_norm_is_taken_with_its_rounding() -> Non
         (gradient(0, epoch=3, values=of_norm(1.01 * CONFIG.gradient_norm)), Reason.NORM),
         (gradient(0, epoch=3, values=np.full(SIZE, 3e38, np.float32)), Reason.NORM),
         (gradient(0, epoch=3, frames=CONFIG.batch * CONFIG.rollout_steps + 1), Reason.RANGE),
+        (gradient(0, epoch=3, values=Bf16Gradient(np.zeros(SIZE, np.uint16))), Reason.CODEC),
     ],
-    ids=["last epoch", "next epoch", "future version", "too long", "too short", "too large", "huge", "too many frames"],
+    ids=[
+        *("last epoch", "next epoch", "future version", "too long", "too short", "too large", "huge"),
+        *("too many frames", "other codec"),
+    ],
 )
 def test_a_gradient_that_does_not_fit_is_refused_and_changes_nothing(item: GradientPush, reason: Reason) -> None:
     core = new_core(epoch=3)
@@ -134,6 +141,25 @@ def test_a_gradient_that_does_not_fit_is_refused_and_changes_nothing(item: Gradi
     assert reply.answer.reason == reason
     assert (core.version, core.statistics.frames) == (0, 0)
     np.testing.assert_array_equal(core.parameters, before)
+
+
+@pytest.mark.parametrize("codec", ["bf16", "int8", "topk"])
+def test_a_compressed_gradient_is_applied_as_what_it_stands_for(codec: Compression) -> None:
+    core, plain = new_core(replace(CONFIG, compress=codec)), new_core()
+    form = Compressor(codec, SIZE, CONFIG.gradient_norm).compress(vector(3))
+    values = Decompressor(SIZE).vector(form)
+    push(core, gradient(0, values=form), gradient(1, values=form))  # the second one lags
+    push(plain, gradient(0, values=values), gradient(1, values=values))
+    np.testing.assert_array_equal(core.parameters, plain.parameters)
+    assert core.version == 2
+
+
+def test_a_compressed_gradient_that_is_too_long_is_refused() -> None:
+    core = new_core(replace(CONFIG, compress="topk"))
+    form = TopKGradient(SIZE, np.array([2], np.uint32), np.array([0x4180], np.uint16))  # 16
+    assert refused(core, gradient(0, values=form)).reason == Reason.NORM
+    full = refused(core, gradient(0))
+    assert (full.reason, full.detail) == (Reason.CODEC, "the gradient travels as fp32; the run's do as topk")
 
 
 def test_a_repeated_gradient_is_acknowledged_again_and_not_applied() -> None:
