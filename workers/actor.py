@@ -1,7 +1,8 @@
-"""The actor: joins a run, gets its rooms ready, rolls out, and pushes gradients until the run is over.
+"""The actor: joins a run, gets its rooms ready, rolls out, and pushes gradients or the rollouts until the run is over.
 
-Everything happens in one thread and in one order, counted in updates, not in seconds: one actor with one seed does the
-same again. The wire's own threads only keep what arrived.
+Everything happens in one order, counted in updates, not in seconds: one actor with one seed does the same again. It
+happens in one thread, except that a rollout waits for its answer in another one while the next is acted. The wire's own
+threads only keep what arrived.
 """
 
 import logging
@@ -28,8 +29,11 @@ from hoz_dist.wire.protocol.answers import Accepted, Refused
 from hoz_dist.wire.protocol.graph_messages import SceneGraphReply
 from hoz_dist.wire.protocol.graphs import scene_graph_of
 from hoz_dist.wire.protocol.message import MAX_EPISODES
+from hoz_dist.wire.protocol.parameters import Parameters
 from hoz_dist.wire.protocol.rejection import Reason
-from workers.collector import Collector
+from hoz_dist.wire.protocol.trajectories import GraphUsed
+from workers.ahead import Ahead
+from workers.collector import Collector, Trajectory
 from workers.link import LearnerLink
 from workers.preparation import RoomPreparation
 from workers.timings import Timings
@@ -42,7 +46,7 @@ REPORT_ROLLOUTS: Final = 5
 REPORT_EPISODES: Final = MAX_EPISODES // 2
 """Finished episodes that are reported at once."""
 _PASSING: Final = frozenset({Reason.EPOCH, Reason.STALE, Reason.INTERNAL})
-"""Reasons of refusals that the next gradient, computed on newer parameters, does not have."""
+"""Reasons of refusals that the next push, of newer parameters, does not have."""
 
 
 class RunOverError(Exception):
@@ -59,6 +63,11 @@ class _Report:
     losses: Counter[str] = field(default_factory=Counter)
     """Sums of the terms of the loss over them."""
     episodes: list[EpisodeResult] = field(default_factory=list)
+
+    def add(self, finished: list[EpisodeResult]) -> None:
+        """Note the episodes that ended in a rollout."""
+        self.rollouts += 1
+        self.episodes += finished
 
     @property
     def is_due(self) -> bool:
@@ -113,10 +122,17 @@ class Actor:
         """Epoch and version that the next parameters must have reached."""
         self._room_graphs: list[RoomGraph] = []
         self._scene_graphs: dict[str, SceneGraphReply] = {}
-        """The messages whose graphs are in use, by scene."""
+        """The newest messages with graphs, by scene."""
+        self._graphs_used: dict[str, GraphUsed] = {}
+        """Those whose graphs are in use."""
+        self._guided = config.policy.zone_layer
         self._report = _Report()
         self._frames = 0
         """Frames that the learner accepted."""
+        self._ahead: Ahead[tuple[Accepted | Refused, int]] = Ahead("hoz pushes rollouts")
+        self._parameters: Parameters | None = None
+        """What the next rollout is acted on, if it is known already."""
+        self._update = self._update_by_rollout if config.learn_from == "rollouts" else self._update_by_gradient
 
     def run(self) -> None:
         """Work until the run is over or `stop` is set.
@@ -135,13 +151,13 @@ class Actor:
                 updates += 1
                 if self._timings is not None:
                     self._timings.update(self._frames, self._preparation.waiting)
-                if self._report.is_due:
-                    self._send_report()
             _log.info("stopped")
         except StoppedError:
             _log.info("stopped")
         except RunOverError:
             _log.info("the run is over")
+        finally:
+            self._ahead.close()
 
     def _prepare_room(self) -> None:
         with self._clock("rooms"):
@@ -174,9 +190,11 @@ class Actor:
                 self._collector.use_graph(scene_graph_of(message))
             except (HozError, ValueError) as error:
                 _log.warning("the learner's graph of %s cannot be used: %s", scene, error)
+            else:
+                self._graphs_used[scene] = GraphUsed(scene, message.epoch, message.version)
 
-    def _update(self) -> None:
-        """Fetch parameters, roll out, push the gradient."""
+    def _fetch(self) -> Parameters:
+        """Return the newest parameters; tell a learner that was restarted what it may have forgotten."""
         with self._clock("parameters"):
             parameters = self._link.parameters(self._newest)
         if parameters.head.epoch != self._epoch:
@@ -185,34 +203,91 @@ class Actor:
             self._link.check_same_run()
             for graph in self._room_graphs:
                 self._push_room_graph(graph)
+        return parameters
+
+    def _load(self, parameters: Parameters) -> None:
         with self._clock("load"):
             self._collector.parameters.load(parameters.vector)
+
+    def _update_by_gradient(self) -> None:
+        """Fetch parameters, roll out, push the gradient."""
+        parameters = self._fetch()
+        self._load(parameters)
         with self._clock("act"):
             update = self._collector.roll_out()
-        self._report.rollouts += 1
-        self._report.episodes += update.finished
+        self._report.add(update.finished)
         if not np.isfinite(update.gradient).all():
             _log.warning("a gradient is not finite; it is dropped")
-            return
-        with self._clock("push"):
-            reply = self._link.push_gradient(update.gradient, update.frames, parameters.head.stamp)
-        match reply:
-            case Accepted(epoch, version):
-                self._frames += update.frames
-                self._newest = (epoch, version)
+        else:
+            with self._clock("push"):
+                reply = self._link.push_gradient(update.gradient, update.frames, parameters.head.stamp)
+            if self._settle("gradient", reply, update.frames):
                 self._report.updates += 1
                 self._report.losses.update(update.loss.terms())
+        if self._report.is_due:
+            self._send(self._take_report())
+
+    def _update_by_rollout(self) -> None:
+        """Act a rollout while the learner learns from the one before, and push it.
+
+        Parameters are fetched after the answer to one push and before the next push. So an actor that is alone always
+        acts on parameters that lack one rollout, the last, however long anything takes.
+        """
+        parameters = self._parameters or self._fetch()
+        self._load(parameters)
+        with self._clock("act"):
+            trajectory = self._collector.record()
+        self._report.add(trajectory.finished)
+        graphs = tuple(self._graphs_used.values()) if self._guided else ()
+        self._settle_ahead()
+        self._parameters = self._fetch()
+        report = self._take_report() if self._report.is_due else None
+        self._ahead.start(lambda: self._push_trajectory(trajectory, graphs, parameters.head.stamp, report))
+
+    def _push_trajectory(
+        self, trajectory: Trajectory, graphs: tuple[GraphUsed, ...], stamp: tuple[int, int], report: _Report | None
+    ) -> tuple[Accepted | Refused, int]:
+        """Push a rollout, and a report if there is one; return the answer to the rollout, and its frames."""
+        with self._clock("push"):
+            reply = self._link.push_trajectory(trajectory.steps, trajectory.rooms, graphs, stamp)
+        if report is not None:
+            self._send(report)
+        return reply, trajectory.frames
+
+    def _settle_ahead(self) -> None:
+        """Wait for the answer to the rollout that is under way, if one is."""
+        with self._clock("wait"):
+            pushed = self._ahead.result()
+        if pushed is not None:
+            self._settle("rollout", *pushed)
+
+    def _settle(self, what: str, reply: Accepted | Refused, frames: int) -> bool:
+        """Take note of the answer to a push; return whether it counted.
+
+        Raises:
+            RunOverError: The budget is used up.
+            HozError: It was refused for a reason that the next one would have as well.
+        """
+        match reply:
+            case Accepted(epoch, version):
+                self._frames += frames
+                self._newest = (epoch, version)
+                return True
             case Refused(Reason.FINISHED):
                 raise RunOverError
             case Refused(reason, detail) if reason in _PASSING:
-                _log.warning("a gradient was refused (%s): %s", reason, detail)
+                _log.warning("a %s was refused (%s): %s", what, reason, detail)
                 self._newest = None
             case Refused(reason, detail):
-                message = f"The learner refused a gradient ({reason}): {detail}."
+                message = f"The learner refused a {what} ({reason}): {detail}."
                 raise HozError(message)
+        return False
 
-    def _send_report(self) -> None:
+    def _take_report(self) -> _Report:
         report, self._report = self._report, _Report()
+        return report
+
+    def _send(self, report: _Report) -> None:
         with self._clock("report"):
             reply = self._link.push_episodes(report.episodes, report.mean_losses)
         match reply:

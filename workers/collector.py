@@ -20,11 +20,11 @@ from hoz_dist.policy.actor_critic import ActorCritic, State
 from hoz_dist.policy.graph_bank import GraphBank
 from hoz_dist.policy.navigator import Guidance
 from hoz_dist.policy.parameters import FlatParameters, make_policy
-from hoz_dist.policy.recurrent import Tape
 from hoz_dist.policy.sampling import sample_actions
+from hoz_dist.policy.tape import Tape
 from hoz_dist.sim.batch_env import BatchEnv
 from hoz_dist.stages import StageClock
-from hoz_dist.wire.protocol.trajectories import RoomUsed, Steps
+from hoz_dist.wire.protocol.trajectories import Flag, RoomUsed, Steps
 from workers.recording import Acted, Seen, steps_of
 
 
@@ -44,6 +44,7 @@ class Trajectory(NamedTuple):
     steps: Steps
     rooms: tuple[RoomUsed, ...]
     """The rooms that the steps count."""
+    frames: int
     finished: list[EpisodeResult]
 
 
@@ -119,7 +120,7 @@ class Collector:
         """
         acted, after = self._act()
         steps, rooms = steps_of(acted, after, self._env.rooms)
-        return Trajectory(steps, rooms, _finished(acted))
+        return Trajectory(steps, rooms, int(steps.has(Flag.VALID).sum()), _finished(acted))
 
     def _act(self) -> tuple[list[Acted], Seen]:
         """Run T steps in every episode; return them, and what is seen after the last."""

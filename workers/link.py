@@ -33,6 +33,7 @@ from hoz_dist.wire.protocol.message import MAX_EPISODES
 from hoz_dist.wire.protocol.parameters import Parameters
 from hoz_dist.wire.protocol.pushes import EpisodesPush, GradientPush, Push, RoomGraphPush
 from hoz_dist.wire.protocol.rejection import Reason
+from hoz_dist.wire.protocol.trajectories import GraphUsed, RoomUsed, Steps, TrajectoryPush
 from hoz_dist.wire.transport.publishing import NewestSubscriber
 from hoz_dist.wire.transport.session import Session
 from hoz_dist.wire.transport.shared_memory import SharedMemory
@@ -100,10 +101,18 @@ class LearnerLink(Closing):
         self._epochs.hear(reply.epoch)
         self._incarnation = secrets.randbits(48)
         self._sequences: Counter[type[Push]] = Counter()
-        noted = journal.write if journal is not None else None
         self._compressor: Compressor | None = None
         """Made for the first gradient, which says how many entries they have."""
-        self._pusher = Pusher(session, stop, epochs=self._epochs, acknowledged=noted, memory=memory, clock=clock)
+        self._new_pusher = lambda: Pusher(
+            session,
+            stop,
+            epochs=self._epochs,
+            acknowledged=journal.write if journal is not None else None,
+            memory=memory,
+            clock=clock,
+        )
+        self._pushers = threading.local()
+        """Each thread that pushes has a pusher of its own, as its attribute ``own``."""
         with ExitStack() as stack:
             stack.enter_context(
                 declare_alive(session, self._keys, Member("actor", actor, host_name(), self._incarnation))
@@ -187,10 +196,34 @@ class LearnerLink(Closing):
             frames=frames,
             gradient=self._compressor.compress(gradient),
         )
-        reply = self._pusher.push(self._keys.grads(self._actor), push)
+        reply = self._push(self._keys.grads(self._actor), push)
         if isinstance(reply, Accepted):
             self._compressor.accepted()
         return reply
+
+    def push_trajectory(
+        self, steps: Steps, rooms: tuple[RoomUsed, ...], graphs: tuple[GraphUsed, ...], acted_on: tuple[int, int]
+    ) -> Accepted | Refused:
+        """Push a rollout; every one that was acted, one after the other.
+
+        Args:
+            steps: What was done and seen.
+            rooms: The rooms that the steps count.
+            graphs: The scene graphs that were used.
+            acted_on: Epoch and version of the parameters that it was acted on.
+        """
+        epoch, version = acted_on
+        push = TrajectoryPush(
+            actor=self._actor,
+            incarnation=self._incarnation,
+            sequence=self._next(TrajectoryPush),
+            epoch=epoch,
+            version=version,
+            rooms=rooms,
+            graphs=graphs,
+            steps=steps,
+        )
+        return self._push(self._keys.rollouts(self._actor), push)
 
     def push_episodes(self, episodes: Sequence[EpisodeResult], losses: Mapping[str, float]) -> Accepted | Refused:
         """Push how episodes ended and how the training goes; more than a message holds go in several.
@@ -211,7 +244,7 @@ class LearnerLink(Closing):
                 episodes=tuple(episodes[first : first + MAX_EPISODES]),
                 **losses,
             )
-            reply = self._pusher.push(self._keys.rollouts(self._actor), push)
+            reply = self._push(self._keys.rollouts(self._actor), push)
             if isinstance(reply, Refused):
                 break
         return reply
@@ -236,7 +269,7 @@ class LearnerLink(Closing):
         )
         key = self._keys.graph(room.scene)
         for _ in range(GRAPH_TRIES):
-            reply = self._pusher.push(self._keys.room(self._actor, room), push)
+            reply = self._push(self._keys.room(self._actor, room), push)
             if isinstance(reply, Refused) and reply.reason != Reason.INTERNAL:
                 return reply
             if self._await_graph(lambda newest: key in newest and room in newest[key].rooms):
@@ -261,6 +294,12 @@ class LearnerLink(Closing):
             if self._stop.is_set():
                 raise StoppedError
         return False
+
+    def _push(self, key: str, message: Push) -> Accepted | Refused:
+        pusher: Pusher | None = getattr(self._pushers, "own", None)
+        if pusher is None:
+            self._pushers.own = pusher = self._new_pusher()
+        return pusher.push(key, message)
 
     def _next(self, kind: type[Push]) -> int:
         self._sequences[kind] += 1
