@@ -14,7 +14,7 @@ import click
 from hoz_dist.bench.timings import TimingsFile, Totals, totals_of
 from hoz_dist.bench.training import Trainers
 from hoz_dist.cli.bench_options import command_line, repeats_option, show_metrics
-from hoz_dist.cli.options import cache_option, json_option
+from hoz_dist.cli.options import cache_option, force_option, json_option
 from hoz_dist.cli.ports import free_endpoint
 from hoz_dist.cli.processes import ACTOR_NICENESS, Child, Children
 from hoz_dist.cli.run_options import as_arguments, run_config, run_options
@@ -57,11 +57,12 @@ if TYPE_CHECKING:
 @repeats_option
 @click.option(
     "--costs",
-    type=click.Path(dir_okay=False, writable=True, path_type=Path),
+    type=click.Path(dir_okay=False, path_type=Path),
     metavar="FILE",
     help="Write what an update costs, for `hoz-dist simulate`, and compare the other runs with its predictions; needs "
     "--actors 1 and --actors 2.",
 )
+@force_option
 @cache_option
 @json_option
 def train_command(
@@ -72,6 +73,7 @@ def train_command(
     costs: Path | None,
     cache: Path | None,
     *,
+    force: bool,
     as_json: bool,
     **choices: Any,
 ) -> None:
@@ -85,12 +87,15 @@ def train_command(
         message = "--costs needs runs with 1 and 2 actors: add --actors 1 --actors 2."
         raise InvalidValueError(message)
 
+    from hoz_dist.atomic import check_writable, write_atomically
     from hoz_dist.bench.training import bottleneck, measure_in_turns, metrics_of
     from hoz_dist.cli.progress import Progress
     from hoz_dist.cli.rendering import Encoding, render_rooms
     from hoz_dist.nav.rooms import training_rooms
     from hoz_dist.sim.view_store import default_cache
 
+    if costs is not None:
+        check_writable(costs, overwrite=force)
     rooms = training_rooms(scenes)
     config = run_config(choices | {"minutes": None, "frames": None})
     folder = cache or default_cache()
@@ -130,7 +135,7 @@ def train_command(
 
         command = command_line(click.get_current_context())
         found = measured_costs(config, measured[_name(1)], measured[_name(2)], jobs, command)
-        costs.write_text(found.to_text(), encoding="utf-8")
+        write_atomically(costs, found.to_text().encode(), overwrite=force)
         for count in counts:
             real = measured[_name(count)].median(lambda window: window.frames_per_second)
             predicted = Metric.of([_predicted(found, count, jobs)], "frames/s", real)

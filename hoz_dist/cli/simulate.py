@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from hoz_dist.cli.options import echo_json, json_option
+from hoz_dist.cli.options import echo_json, force_option, json_option
 from hoz_dist.errors import InvalidValueError
 
 if TYPE_CHECKING:
-    from hoz_dist.scaling.setting import Prediction
+    from hoz_dist.scaling.costs import Costs
 
 DEFAULT_ACTORS: Final = ("1,10,100,1000,10000",)
 
@@ -66,13 +66,25 @@ DEFAULT_ACTORS: Final = ("1,10,100,1000,10000",)
     help="Learners that share the parameters, each on a host. A design: there is one learner today.",
 )
 @click.option(
-    "--relays",
+    "--fan-out",
     type=int,
-    default=0,
-    show_default=True,
-    metavar="R",
-    help="Relays that hand on parameters and sum up gradients, each on a host. A design: there are none today.",
+    metavar="F",
+    help="Put relays, which hand on parameters and sum up gradients, between the learner and more than F actors; each "
+    "has a host and up to F below it. A design: there are none today.  [default: none]",
 )
+@click.option(
+    "--designs",
+    is_flag=True,
+    help="Compare designs: full gradients, small ones, rollouts, several learners, relays; takes the place of "
+    "--learn-from, --compress, --parameters, --shards and --fan-out.",
+)
+@click.option(
+    "--plot",
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="Draw frames per second against the number of actors into a PNG file.",
+)
+@force_option
 @click.option("--seed", type=int, default=0, show_default=True, help="Seed of everything random in the simulation.")
 @json_option
 def simulate_command(
@@ -85,8 +97,11 @@ def simulate_command(
     learn_from: str | None,
     compress: str | None,
     parameters: str | None,
+    plot: Path | None,
     seed: int,
     *,
+    designs: bool,
+    force: bool,
     as_json: bool,
     **setting: Any,
 ) -> None:
@@ -95,36 +110,61 @@ def simulate_command(
     A discrete-event simulation fed by measured costs; docs/scaling.md says how near it comes. 10,000 actors take about
     a minute.
     """
+    from hoz_dist.atomic import check_writable, write_atomically
     from hoz_dist.cli.progress import Progress
-    from hoz_dist.scaling.costs import load_costs, shipped_costs
+    from hoz_dist.cli.simulate_output import Row, picture, print_table
+    from hoz_dist.scaling.costs import Costs, shipped_costs
+    from hoz_dist.scaling.designs import Design
+    from hoz_dist.scaling.designs import designs as designs_of
     from hoz_dist.scaling.model import simulate
     from hoz_dist.scaling.setting import Setting
 
-    measured = shipped_costs(preset) if costs is None else load_costs(costs)
-    measured = measured.adapted(learn_from=learn_from, compress=compress, parameters_form=parameters)
+    numbers = _numbers(actors)
+    if plot is not None:
+        check_writable(plot, overwrite=force)
+    if costs is None:
+        measured = shipped_costs(preset)
+    else:
+        measured = Costs.from_text(costs.read_text(encoding="utf-8", errors="replace"), str(costs))
     base = Setting(
         actors=1,
         latency=latency / 1e3,
         bandwidth=bandwidth * 1e6,
         learner_bandwidth=None if learner_bandwidth is None else learner_bandwidth * 1e6,
-        **(setting | {"relays": 0}),
+        **setting,
     )
-    settings = [replace(base, actors=number, relays=setting["relays"]) for number in _numbers(actors)]
-    predictions, took = [], []
-    with Progress("Simulating", len(settings), None) as progress:
-        for done, one in enumerate(settings):
-            began = time.perf_counter()
-            note = f"{one.actors:,} actors"
-            predictions.append(
-                simulate(measured, one, seed, lambda share, d=done, n=note: progress.update(d + share, n))
-            )
-            took.append(time.perf_counter() - began)
-        progress.update(len(settings))
+    if designs:
+        compared = designs_of(measured, base)
+    else:
+        adapted = measured.adapted(learn_from=learn_from, compress=compress, parameters_form=parameters)
+        compared = [Design(_described(adapted), adapted, base)]
+    rows: list[Row] = []
+    with Progress("Simulating", len(compared) * len(numbers), None) as progress:
+        for design in compared:
+            for number in numbers:
+                note, done, began = f"{design.name}, {number:,} actors", len(rows), time.perf_counter()
+                predicted = simulate(
+                    design.costs,
+                    replace(design.setting, actors=number),
+                    seed,
+                    lambda share, d=done, n=note: progress.update(d + share, n),
+                )
+                rows.append(Row(design.name, predicted, time.perf_counter() - began))
+        progress.update(len(rows))
+    if plot is not None:
+        write_atomically(plot, picture(rows, measured), overwrite=force)
     if as_json:
-        results = [one.to_json() | {"took_seconds": round(s, 1)} for one, s in zip(predictions, took, strict=True)]
+        results = [
+            {"design": row.design} | row.prediction.to_json() | {"took_seconds": round(row.took, 1)} for row in rows
+        ]
         echo_json({"costs": {"preset": measured.preset, "machine": measured.machine}, "predictions": results})
-        return
-    _print(predictions)
+    else:
+        print_table(rows)
+
+
+def _described(costs: "Costs") -> str:
+    what = "rollouts" if costs.learn_from == "rollouts" else f"{costs.compress} gradients"
+    return f"{what}, {costs.parameters_form} parameters"
 
 
 def _numbers(texts: tuple[str, ...]) -> list[int]:
@@ -139,35 +179,3 @@ def _numbers(texts: tuple[str, ...]) -> list[int]:
         message = f"'{wrong}' is no number of actors; give whole numbers, as in --actors 1,10,100."
         raise InvalidValueError(message)
     return [int(word) for word in words]
-
-
-def _print(predictions: "list[Prediction]") -> None:
-    from rich.console import Console
-    from rich.table import Table
-
-    table = Table()
-    for column in ("actors", "frames/s", "lag", "age", "stale", "busy", "learner", "to it", "from it", "fullest"):
-        table.add_column(column, justify="left" if column == "fullest" else "right")
-    for one in predictions:
-        table.add_row(
-            f"{one.actors:,}",
-            f"{one.frames_per_second:,.0f}",
-            f"{one.lag:.1f}",
-            f"{one.age:.2g} s",
-            f"{one.stale:.0%}",
-            f"{one.busy:.2f}",
-            f"{one.apply_load:.0%}",
-            f"{one.megabits_up:,.0f} Mbit/s",
-            f"{one.megabits_down:,.0f} Mbit/s",
-            one.bottleneck,
-        )
-    console = Console(highlight=False)
-    (console if console.is_terminal else Console(highlight=False, width=_FILE_WIDTH)).print(table)
-    click.echo(_LEGEND)
-
-
-_FILE_WIDTH: Final = 140
-_LEGEND: Final = (
-    "lag: parameter versions; age: from an actor's parameters to the update; stale: gradients refused for their lag; "
-    "busy: times that a gradient is told to come again; learner: load of the thread that applies gradients."
-)

@@ -4,7 +4,6 @@ import json
 from collections.abc import Iterable
 from dataclasses import MISSING, asdict, dataclass, fields, replace
 from importlib.resources import files
-from pathlib import Path
 from typing import Final
 
 from hoz_dist.errors import DamagedFileError, InvalidValueError, UnknownNameError
@@ -189,16 +188,6 @@ class Costs:
         except (InvalidValueError, UnknownNameError) as error:
             message = f"'{path}' is no file of costs: {error}"
             raise DamagedFileError(message) from error
-
-
-def load_costs(path: Path) -> Costs:
-    """Read a file of costs.
-
-    Raises:
-        DamagedFileError: It is none.
-        OSError: It cannot be read.
-    """
-    return Costs.from_text(path.read_text(encoding="utf-8", errors="replace"), str(path))
 
 
 def shipped_costs(preset: str) -> Costs:

@@ -37,7 +37,7 @@ class Learner(Node):
             yield from self._compute(self.costs.fixed)
             counted.stale += push.count
             return Answer("stale", self.version)
-        yield from self._compute(self.costs.apply + self.costs.record)
+        yield from self._compute(self.costs.apply)
         yield from self._publish()
         self.version += 1
         counted.updates += 1
@@ -47,3 +47,8 @@ class Learner(Node):
         counted.ages += push.count * (self.env.now - push.made_at)
         counted.lag_max = max(counted.lag_max, lag)
         return Answer("accepted", self.version)
+
+    @property
+    def _afterwards(self) -> float:
+        """Time for records and checkpoints."""
+        return self.costs.record

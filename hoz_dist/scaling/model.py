@@ -54,8 +54,8 @@ class _Moment:
     """Seconds of the actors' cores."""
     used: dict[str, float]
     """Seconds in which each of the learner's resources was fully used."""
-    relay: dict[str, float]
-    """The same, of one relay."""
+    relays: list[dict[str, float]]
+    """The same, of a relay of each level."""
 
 
 class _Run:
@@ -65,7 +65,7 @@ class _Run:
     """
 
     def __init__(self, costs: Costs, setting: Setting, seed: int, progress: Told | None) -> None:
-        if costs.learn_from == "rollouts" and (setting.shards > 1 or setting.relays):
+        if costs.learn_from == "rollouts" and (setting.shards > 1 or setting.fan_out is not None):
             message = "Rollouts have no parts that learners could share, nor a sum: shards and relays need gradients."
             raise InvalidValueError(message)
         self._costs, self._setting, self._progress = costs, setting, progress
@@ -76,20 +76,25 @@ class _Run:
         self._host = Shared(env, setting.cores, costs.crowding)
         # All cores of the actors' hosts work, as those of this host do with two actors.
         self._actors = self._host if setting.one_host else Shared(env, math.inf, costs.crowding)
-        between = setting.hub_bandwidth if setting.relays else setting.bandwidth
-        part = costs.part(setting.shards)
-        self._link = self._make_link(between / setting.shards)
         self._latency = 0.0 if setting.one_host else setting.latency
+        levels = setting.relays
+        between = setting.hub_bandwidth if levels else setting.bandwidth
         self._learner = Learner(
-            Place(env, self._host, self._link, self._latency),
-            part,
-            clients=setting.relays or setting.actors,
+            Place(env, self._host, self._make_link(between / setting.shards), self._latency),
+            costs.part(setting.shards),
+            clients=(*levels, setting.actors)[0],
             counted=self._counted,
             max_lag=setting.max_lag,
         )
-        self._relays = [self._make_relay(number) for number in range(setting.relays)]
+        self._samples: list[Node] = []
+        """A relay of each level."""
+        above: list[Node] = [self._learner]
+        for relays, below in zip(levels, (*levels, setting.actors)[1:], strict=True):
+            flow = setting.bandwidth if below == setting.actors else setting.hub_bandwidth
+            above = [self._make_relay(above[n % len(above)], flow, below // relays) for n in range(relays)]
+            self._samples.append(above[0])
         for number in range(setting.actors):
-            env.process(self._actor(self._relays[number % setting.relays] if self._relays else self._learner))
+            env.process(self._actor(above[number % len(above)]))
 
     def measure(self) -> Prediction:
         """Let it get under way, and measure it."""
@@ -133,27 +138,24 @@ class _Run:
     def _make_link(self, flow: float) -> Link:
         return Link(self._env, math.inf if self._setting.one_host else self._setting.hub_bandwidth, flow)
 
-    def _make_relay(self, number: int) -> Relay:
-        setting = self._setting
-        host = Shared(self._env, setting.cores, self._costs.crowding)
-        clients = len(range(number, setting.actors, setting.relays))
-        place = Place(self._env, host, self._make_link(setting.bandwidth), self._latency)
-        return Relay(self._learner, place, self._costs, clients=clients, counted=self._counted, rng=self._rng)
+    def _make_relay(self, above: Node, flow: float, clients: int) -> Node:
+        host = Shared(self._env, self._setting.cores, self._costs.crowding)
+        place = Place(self._env, host, self._make_link(flow), self._latency)
+        return Relay(above, place, self._costs, clients=clients, counted=self._counted, rng=self._rng)
 
     def _moment(self) -> _Moment:
-        relay = self._relays[0] if self._relays else None
-        used = self._used_by(self._learner, self._link)
         return _Moment(
             self._env.now,
             replace(self._counted),
             self._actors.used(),
-            used | {"host": self._host.used() / self._setting.cores},
-            self._used_by(relay, relay.link) if relay is not None else {},
+            self._used_by(self._learner) | {"host": self._host.used() / self._setting.cores},
+            [self._used_by(relay) for relay in self._samples],
         )
 
     @staticmethod
-    def _used_by(node: Node, link: Link) -> dict[str, float]:
+    def _used_by(node: Node) -> dict[str, float]:
         """Return the seconds in which each resource was fully used."""
+        link = node.link
         return {
             "apply": node.main_used,
             "receive": node.receive_used,
@@ -168,7 +170,11 @@ class _Run:
         count = {name: value - getattr(start.counted, name) for name, value in asdict(end.counted).items()}
         applied, pushed = max(count["applied"], 1), max(count["pushed"], 1)
         loads = {f"{name}_load": (used - start.used[name]) / seconds for name, used in end.used.items()}
-        relay = [(used - start.relay[name]) / seconds for name, used in end.relay.items()]
+        relays = [
+            (used - before[name]) / seconds
+            for before, after in zip(start.relays, end.relays, strict=True)
+            for name, used in after.items()
+        ]
         part = self._learner.costs
         tries = count["updates"] + count["stale"] + count["busy"] + count["resent"]
         cores = self._setting.cores if self._setting.one_host else self._setting.actors
@@ -183,7 +189,7 @@ class _Run:
             busy=count["busy"] / pushed,
             resent=count["resent"] / pushed,
             actor_load=(end.actors - start.actors) / seconds / cores,
-            relay_load=max(relay, default=None),
+            relay_load=max(relays, default=None),
             megabits_up=8e-6 * tries * part.bytes_up / seconds,
             megabits_down=8e-6 * count["fetched"] * part.bytes_down / seconds,
             simulated_seconds=seconds,

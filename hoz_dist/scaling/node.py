@@ -208,8 +208,9 @@ class Node:
             else:
                 request.push.is_done = True
                 answer = yield from self.handle(request.push)
-            self.main_used += self.env.now - began
             self._answer(request, answer)
+            yield from self._compute(self._afterwards)
+            self.main_used += self.env.now - began
 
     def _compute(self, seconds: float) -> Process:
         """Work in a Python thread: a share of the time with the interpreter lock."""
@@ -233,6 +234,11 @@ class Node:
 
     def _answer(self, request: Request, answer: Answer) -> None:
         call(self.env, self.latency + self.costs.exchange, request.reply.succeed, answer)
+
+    @property
+    def _afterwards(self) -> float:
+        """Time of the main thread for a push that was answered already."""
+        return 0.0
 
     @property
     def _wire_up(self) -> float:

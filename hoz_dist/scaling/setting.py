@@ -25,13 +25,14 @@ class Setting:
     bandwidth: float = 1e10
     """Of an actor's link, each way, bits/s."""
     learner_bandwidth: float | None = None
-    """Of the link of a learner or relay, each way, bits/s; None for that of an actor."""
+    """Of the links of learners and relays, each way, bits/s; None for that of an actor."""
     max_lag: int = 32
     """Largest policy lag at which a gradient is applied, versions."""
     shards: int = 1
     """S, learners over which the parameters are split; each has a host."""
-    relays: int = 0
-    """R, processes between actors and learner, each with a host, that hand parameters on and sum gradients up."""
+    fan_out: int | None = None
+    """Largest number of processes that push to one. Where there are more, relays, each with a host, stand in between in
+    as many levels as it takes; they hand parameters on and sum gradients up. None for no relays."""
 
     def __post_init__(self) -> None:
         """Check every field."""
@@ -40,12 +41,19 @@ class Setting:
             if value is not None and not (low <= value <= high):
                 message = f"'{name}' is {value:g}; it must be from {low:g} to {high:g}."
                 raise InvalidValueError(message)
-        if self.relays > self.actors:
-            message = f"There are {self.relays} relays for {self.actors} actors; a relay needs an actor."
-            raise InvalidValueError(message)
-        if self.one_host and (self.shards > 1 or self.relays):
+        if self.one_host and (self.shards > 1 or self.fan_out is not None):
             message = "Shards and relays have hosts of their own, so they cannot be simulated on one host."
             raise InvalidValueError(message)
+
+    @property
+    def relays(self) -> tuple[int, ...]:
+        """Relays of each level, the one below the learner first."""
+        levels: list[int] = []
+        below = self.actors
+        while self.fan_out is not None and below > self.fan_out:
+            below = -(-below // self.fan_out)
+            levels.insert(0, below)
+        return tuple(levels)
 
     @property
     def hub_bandwidth(self) -> float:
@@ -61,7 +69,7 @@ _RANGES: Final = (
     ("learner_bandwidth", 1e3, 1e15),
     ("max_lag", 0, 1_000_000),
     ("shards", 1, 4096),
-    ("relays", 0, 100_000),
+    ("fan_out", 2, 100_000),
 )
 """Field, least value, largest value."""
 

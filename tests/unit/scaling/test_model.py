@@ -18,7 +18,7 @@ ALL = {
     "apply": 0.06,
     "publish": 0.07,
     "serve": 0.08,
-    "record": 0.01,
+    "record": 0.0,  # while the actor goes on
     "learner_wire": 0.08,
 }
 
@@ -104,13 +104,23 @@ def test_shards_divide_what_depends_on_the_size() -> None:
     assert found.updates_per_second == pytest.approx(1 / (0.002 + 0.098 / 10), rel=0.03)
 
 
-def test_a_relay_spares_the_learner_its_actors() -> None:
+def test_relays_spare_the_learner_the_actors() -> None:
     slow = costs(act=1.0, apply=0.05)
     alone = simulate(slow, setting(actors=100))
-    helped = simulate(slow, setting(actors=100, relays=10))
+    helped = simulate(slow, setting(actors=100, fan_out=10))
     assert alone.updates_per_second == pytest.approx(1 / 0.05, rel=0.02)
+    assert alone.relay_load is None
     assert helped.frames_per_second == pytest.approx(100 * 100 / 1.0, rel=0.1)
     assert helped.lag < alone.lag
+    assert helped.relay_load is not None
+
+
+def test_relays_stand_in_as_many_levels_as_it_takes() -> None:
+    assert setting(actors=100).relays == ()
+    assert setting(actors=10, fan_out=10).relays == ()
+    assert setting(actors=11, fan_out=10).relays == (2,)
+    assert setting(actors=1000, fan_out=10).relays == (10, 100)
+    assert setting(actors=1001, fan_out=10).relays == (2, 11, 101)
 
 
 def test_one_seed_gives_one_result() -> None:
@@ -129,7 +139,7 @@ def test_progress_ends_with_all() -> None:
 
 def test_rollouts_have_neither_shards_nor_relays() -> None:
     rollouts = costs(act=1.0).adapted(learn_from="rollouts")
-    for design in ({"shards": 2}, {"relays": 1}):
+    for design in ({"shards": 2}, {"fan_out": 2}):
         with pytest.raises(InvalidValueError, match="need gradients"):
             simulate(rollouts, setting(actors=4, **design))
 
