@@ -7,7 +7,7 @@ from hoz_dist.errors import InvalidValueError, UnknownNameError
 from hoz_dist.graph.checks import MAX_ZONES
 from hoz_dist.graph.planner import DEFAULT_EDGE_COST, EdgeCost
 from hoz_dist.nav.pose import PICTURE_SIZE
-from hoz_dist.policy.settings import EncoderName, Layer, Method, PolicySettings, Preset
+from hoz_dist.policy.settings import EncoderName, Layer, Method, PolicySettings, Precision, Preset
 
 Compression = Literal["fp32", "bf16", "int8", "topk"]
 """How gradients travel: in full, as halves, as bytes, or their largest entries alone."""
@@ -18,6 +18,8 @@ Source = Literal["gradients", "rollouts"]
 
 PRESET_LEARNING_RATES: Final[dict[Preset, float]] = {"compact": 1e-3, "paper": 1e-4}
 """Adam's learning rate at the start; the paper's is 1e-4."""
+PRESET_PRECISIONS: Final[dict[Preset, Precision]] = {"compact": "fp32", "paper": "bf16"}
+"""Precision of the LSTM's products: small ones gain nothing from the lower one."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,6 +35,8 @@ class RunConfig:
     without: tuple[Layer, ...] = ()
     """Layers of the method that are switched off."""
     preset: Preset = "compact"
+    precision: Precision = "fp32"
+    """Of the LSTM's products over rollouts; on processors without products of bf16 they are of fp32."""
     encoder: EncoderName = "pooled"
     encoder_key: str = "pooled-1-g7"
     """Names the encoder's version and weights: actors with others are refused."""
@@ -76,6 +80,7 @@ class RunConfig:
         for name, value, known in (
             ("method", self.method, get_args(Method)),
             ("preset", self.preset, get_args(Preset)),
+            ("precision", self.precision, get_args(Precision)),
             ("encoder", self.encoder, get_args(EncoderName)),
             ("edge cost", self.edge_cost, get_args(EdgeCost)),
             ("source to learn from", self.learn_from, get_args(Source)),
@@ -98,7 +103,12 @@ class RunConfig:
     def policy(self) -> PolicySettings:
         """The settings of the policy network."""
         return PolicySettings.of(
-            self.method, self.preset, channels=self.channels, zones=self.zones, without=self.without
+            self.method,
+            self.preset,
+            channels=self.channels,
+            zones=self.zones,
+            without=self.without,
+            precision=self.precision,
         )
 
     def to_json(self) -> dict[str, Any]:

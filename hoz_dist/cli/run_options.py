@@ -8,7 +8,7 @@ from typing import Any, Final, TypeVar
 import click
 
 from hoz_dist.cli.options import picture_size_option, weights_option
-from hoz_dist.config import PRESET_LEARNING_RATES, RunConfig
+from hoz_dist.config import PRESET_LEARNING_RATES, PRESET_PRECISIONS, RunConfig
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -28,6 +28,11 @@ _OPTIONS: Final = (
     ),
     click.option(
         "--preset", default=RunConfig.preset, show_default=True, help="Sizes of the network: compact or paper."
+    ),
+    click.option(
+        "--precision",
+        help="Of the LSTM's matrix products in training: fp32, or bf16, where the processor has it.  "
+        "[default: fp32 compact, bf16 paper]",
     ),
     click.option("--encoder", default=RunConfig.encoder, show_default=True, help="Visual encoder: pooled or resnet18."),
     weights_option,
@@ -100,10 +105,14 @@ def run_config(choices: Mapping[str, Any]) -> RunConfig:
     values = dict(choices)
     weights: Path | None = values.pop("weights")
     learning_rate: float | None = values.pop("learning_rate")
+    precision: str | None = values.pop("precision")
+    if precision is not None:
+        values["precision"] = precision
     config = RunConfig(**values)  # checks the names before they are used below
     encoder = load_encoder(config.encoder, weights)
     return replace(
         config,
+        precision=PRESET_PRECISIONS[config.preset] if precision is None else config.precision,
         learning_rate=PRESET_LEARNING_RATES[config.preset] if learning_rate is None else learning_rate,
         encoder_key=encoder.key,
         channels=encoder.channels,

@@ -17,8 +17,9 @@ from hoz_dist.nav.observation import Observation
 from hoz_dist.policy.graph_bank import GraphBank
 from hoz_dist.policy.layers import DoneReminder, ObjectLayer, SceneLayer, ZoneLayer
 from hoz_dist.policy.navigator import Guidance, ZoneState, guide, initial_zone_state
-from hoz_dist.policy.recurrent import EpisodicLSTM, Tape
+from hoz_dist.policy.recurrent import EpisodicLSTM
 from hoz_dist.policy.settings import PolicySettings
+from hoz_dist.policy.tape import Tape
 from hoz_dist.policy.trunks import make_trunk
 
 
@@ -126,7 +127,7 @@ class ActorCritic(nn.Module):
 
     def tape(self, steps: int, batch: int) -> Tape:
         """Return an empty tape for T steps of B episodes."""
-        return self.lstm.tape(steps, batch)
+        return self.lstm.tape(steps, batch, self.settings.precision)
 
     @torch.no_grad()
     def act(self, observation: Observation, state: State, bank: GraphBank, tape: Tape | None = None) -> Decision:
@@ -138,9 +139,12 @@ class ActorCritic(nn.Module):
             bank: Scene graphs; not used without the zone layer.
             tape: Where to record the step for `unroll`; None not to.
         """
+        # For one step, copying the weights in a lower precision would cost more than it saves.
+        tape = tape or self.lstm.tape(1, len(observation.first))
         inputs = _Inputs.of(observation)
         first = torch.from_numpy(observation.first)
-        picture = self.trunk.see(inputs.features)
+        with _products_in(tape.dtype):
+            picture = self.trunk.see(inputs.features)
         scene_logits = self._scene_logits(picture, inputs)
         zone, guidance = state.zone, Guidance.nothing(len(first))
         embedding = None
@@ -148,8 +152,7 @@ class ActorCritic(nn.Module):
             scene = torch.from_numpy(observation.scene)
             zone, guidance = guide(self.zone_layer, bank, zone, inputs.bag, inputs.target, scene_logits, scene, first)
             embedding = self.zone_layer(zone.nodes, bank.adjacency[guidance.scene, guidance.subgoal])
-        joined = self._join(inputs, picture, scene_logits, embedding)
-        tape = tape or self.tape(1, len(first))
+        joined = self._join(inputs, picture, scene_logits, embedding, tape.dtype)
         outputs = self.lstm.step(joined, first, state.lstm, tape)
         logits, value = self._heads(outputs, inputs)
         return Decision(logits, value, State(tape.state, zone), guidance)
@@ -168,9 +171,11 @@ class ActorCritic(nn.Module):
                 again; or an empty one to record it on. It must stay as it is until the gradient is computed.
         """
         steps, batch = observation.target.shape
+        tape = self.tape(steps, batch) if tape is None else tape
         inputs = _Inputs.of(observation)
         first = torch.from_numpy(observation.first)
-        picture = self.trunk.see(inputs.features)
+        with _products_in(tape.dtype):
+            picture = self.trunk.see(inputs.features)
         scene_logits = self._scene_logits(picture, inputs)
         zone, embedding = state.zone, None
         if self.zone_layer is not None:
@@ -179,9 +184,7 @@ class ActorCritic(nn.Module):
             rows = bank.adjacency[guidance.scene.flatten(), guidance.subgoal.flatten()]
             embedding = self.zone_layer(nodes.flatten(0, 1), rows)
             zone = zone._replace(nodes=nodes[-1].detach(), scene=guidance.scene[-1])
-        joined = self._join(inputs, picture, scene_logits, embedding)
-        joined = joined.view(steps, batch, -1)
-        tape = self.tape(steps, batch) if tape is None else tape
+        joined = self._join(inputs, picture, scene_logits, embedding, tape.dtype).view(steps, batch, -1)
         if tape.is_empty:
             self.lstm.record(joined, first, state.lstm, tape)
         outputs = self.lstm.differentiable(joined, tape)
@@ -213,7 +216,12 @@ class ActorCritic(nn.Module):
         return torch.stack(over_time)
 
     def _join(
-        self, inputs: _Inputs, picture: Tensor, scene_logits: Tensor | None, zone_embedding: Tensor | None
+        self,
+        inputs: _Inputs,
+        picture: Tensor,
+        scene_logits: Tensor | None,
+        zone_embedding: Tensor | None,
+        dtype: torch.dtype,
     ) -> Tensor:
         context = [self.target_embedding(inputs.target), self.action_embedding(inputs.previous_action)]
         if scene_logits is not None:
@@ -224,10 +232,16 @@ class ActorCritic(nn.Module):
         objects = None
         if self.object_layer is not None:
             objects = self.object_layer(inputs.detections, inputs.appearance, inputs.target)
-        return self.trunk(picture, objects, torch.cat(context, dim=1))  # type: ignore[no-any-return]
+        with _products_in(dtype):
+            return self.trunk(picture, objects, torch.cat(context, dim=1))  # type: ignore[no-any-return]
 
     def _heads(self, outputs: Tensor, inputs: _Inputs) -> tuple[Tensor, Tensor]:
         logits = self.actor(outputs)
         if self.done_reminder is not None:
             logits = self.done_reminder(logits, inputs.confidence, inputs.target)
         return logits, self.critic(outputs).squeeze(-1)
+
+
+def _products_in(dtype: torch.dtype) -> torch.autocast:
+    """Compute products, and what follows from them element by element, in a type."""
+    return torch.autocast("cpu", dtype, enabled=dtype != torch.float32)

@@ -6,6 +6,8 @@ from typing import Final, Literal
 Method = Literal["a3c", "object", "hoz"]
 Preset = Literal["compact", "paper"]
 EncoderName = Literal["pooled", "resnet18"]
+Precision = Literal["fp32", "bf16"]
+"""Of the factors of matrix products; sums, activations and parameters are always fp32."""
 Layer = Literal["object", "scene", "zone", "done"]
 """Layers that can be switched off: object, scene and zone layer, done reminder."""
 
@@ -61,10 +63,19 @@ class PolicySettings:
     done_reminder: bool = True
     zones: int = 8
     """K of the scene graphs."""
+    precision: Precision = "fp32"
+    """Of the LSTM's products over rollouts; has no part in the parameters."""
 
     @classmethod
     def of(
-        cls, method: Method, preset: Preset, *, channels: int, zones: int, without: tuple[Layer, ...] = ()
+        cls,
+        method: Method,
+        preset: Preset,
+        *,
+        channels: int,
+        zones: int,
+        without: tuple[Layer, ...] = (),
+        precision: Precision = "fp32",
     ) -> "PolicySettings":
         """Return the settings of a method, less some of its layers."""
         layers = set(METHOD_LAYERS[method]) - set(without)
@@ -76,4 +87,5 @@ class PolicySettings:
             scene_layer="scene" in layers,
             zone_layer="zone" in layers,
             done_reminder="done" in layers,
+            precision=precision,
         )

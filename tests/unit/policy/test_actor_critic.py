@@ -10,7 +10,8 @@ from hoz_dist.policy.actor_critic import ActorCritic, Decision, State
 from hoz_dist.policy.graph_bank import GraphBank
 from hoz_dist.policy.navigator import Guidance
 from hoz_dist.policy.parameters import FlatParameters, initial_parameters, make_policy
-from hoz_dist.policy.settings import Layer, Method, Preset
+from hoz_dist.policy.settings import Layer, Method, Precision, Preset
+from hoz_dist.policy.tape import dtype_of
 from tests.unit.policy.making import make_observation, make_scene_graph, step_of
 
 STEPS, BATCH = 9, 4
@@ -54,6 +55,29 @@ def test_unrolling_says_what_acting_said(without: tuple[Layer, ...], preset: Pre
     torch.testing.assert_close(unrolled.state.lstm, after.lstm, atol=1e-5, rtol=1e-4)
     torch.testing.assert_close(unrolled.state.zone.nodes, after.zone.nodes)
     assert torch.equal(unrolled.state.zone.scene, after.zone.scene)
+
+
+@pytest.mark.skipif(dtype_of("bf16") != torch.bfloat16, reason="the processor has no products of bf16")
+@pytest.mark.parametrize("preset", ["compact", "paper"])
+def test_products_in_bf16_change_outputs_and_gradient_little(preset: Preset, bank: GraphBank) -> None:
+    observation = make_observation(STEPS, BATCH)
+    outputs, gradients = [], []
+    for precision in get_args(Precision):
+        policy = make_policy(RunConfig(preset=preset, precision=precision).policy, 0)
+        flat, tape, state = FlatParameters(policy), policy.tape(STEPS, BATCH), policy.initial_state(BATCH)
+        decisions = []
+        for t in range(STEPS):
+            decisions.append(policy.act(step_of(observation, t), state, bank, tape))
+            state = decisions[-1].state
+        guidance = Guidance(*map(torch.stack, zip(*(decision.guidance for decision in decisions), strict=True)))
+        unrolled = policy.unroll(observation, policy.initial_state(BATCH), guidance, bank, tape)
+        (unrolled.logits.square().sum() + unrolled.values.sum()).backward()  # type: ignore[no-untyped-call]
+        outputs.append(torch.cat([unrolled.logits.flatten(), unrolled.values.flatten()]).detach())
+        gradients.append(flat.gradients.double())
+    full, low = gradients
+    assert not torch.equal(full, low)
+    assert (full - low).norm() < 0.02 * full.norm()
+    assert (outputs[0] - outputs[1]).norm() < 0.02 * outputs[0].norm()
 
 
 def test_the_tape_of_acting_gives_the_same_gradient_as_computing_it_again(bank: GraphBank) -> None:
