@@ -15,9 +15,13 @@ from hoz_dist.bench.report import Metric
 from hoz_dist.bench.timing import Contender, Progress, run_contests
 from hoz_dist.bench.timings import TimingsFile, Totals, between
 
-ACTOR_STAGES: Final = ("act", "differentiate", "push", "answer", "parameters", "load", "rooms", "report")
-"""Stages of an actor, `workers.actor`; ``answer`` is the wait for the learner's, ``parameters`` that for its own."""
-LEARNER_STAGES: Final = ("receive", "apply", "publish", "serve", "record", "idle")
+ACTOR_STAGES: Final = ("act", "differentiate", "push", "answer", "wait", "parameters", "load", "rooms", "report")
+"""Stages of an actor, `workers.actor`; ``answer`` is the wait for that of the learner to a push."""
+AHEAD: Final = frozenset({"push", "answer", "report"})
+"""Stages that go on in another thread while rollouts are acted, and ``wait`` is the wait for their end."""
+WAITING: Final = frozenset({"answer", "wait", "parameters"})
+"""Stages in which an actor mostly waits for the learner."""
+LEARNER_STAGES: Final = ("receive", "apply", "differentiate", "publish", "serve", "record", "idle")
 """Stages of a learner, `learner.serving`; ``receive`` and ``serve`` are of other threads than the rest."""
 SETTLING: Final = 2
 """Updates of each actor before it is measured, after it stood still."""
@@ -194,8 +198,8 @@ def bottleneck(run: Measured) -> str:
     It is the stage in which an actor spends most of its time; if it spends that waiting for the learner, it is the
     stage in which the learner does.
     """
-    longest = max((*ACTOR_STAGES, "other"), key=lambda stage: run.median(lambda w: _wall(w, stage)))
-    if longest not in {"answer", "parameters"}:
+    longest = max((*_own(run.windows[0]), "other"), key=lambda stage: run.median(lambda w: _wall(w, stage)))
+    if longest not in WAITING:
         return f"actor {longest}"
     busy = [stage for stage in LEARNER_STAGES if stage != "idle"]
     return f"learner {max(busy, key=lambda stage: run.median(lambda w: w.of_learner(f'{stage}.wall')))}"
@@ -205,5 +209,11 @@ def _wall(window: Window, stage: str) -> float:
     """Return the time of a stage of an actor's update, seconds."""
     if stage != "other":
         return window.actor(f"{stage}.wall")
-    stages = sum(total for name, total in window.actors.items() if name.endswith(".wall"))
-    return (window.actors["wall"] - stages) / window.updates
+    own = sum(window.actors.get(f"{name}.wall", 0.0) for name in _own(window))
+    return (window.actors["wall"] - own) / window.updates
+
+
+def _own(window: Window) -> list[str]:
+    """Return the stages of an actor's main thread."""
+    ahead = AHEAD if window.actors.get("wait.count", 0.0) > 0 else frozenset()
+    return [stage for stage in ACTOR_STAGES if stage not in ahead]

@@ -120,16 +120,26 @@ class _Run:
         client = Client(above, host, self._rng)
         work = costs.load + costs.act + costs.differentiate
         yield env.timeout(self._rng.uniform(0.0, work))
-        version: int | None = None
+        version = yield from client.fetch()
+        ahead: simpy.Process | None = None
         while True:
+            push = Push(version, env.now, costs.frames)
+            yield host.use(work)
+            if costs.learn_from == "rollouts":  # the next is acted while the learner learns from this one
+                if ahead is not None:
+                    yield ahead
+                version = yield from client.fetch()
+                ahead = env.process(self._push(client, push))
+                continue
+            yield from self._push(client, push)
             if version != above.version:  # a relay may have nothing newer
                 version = yield from client.fetch()
-            made_at = env.now
-            yield host.use(work)
-            yield from client.push(Push(version, made_at, costs.frames))
-            self._counted.pushed += 1
-            if self._counted.pushed >= self._until or self._counted.pushed % _PROGRESS_EVERY == 0:
-                self._answered()
+
+    def _push(self, client: Client, push: Push) -> Process:
+        yield from client.push(push)
+        self._counted.pushed += 1
+        if self._counted.pushed >= self._until or self._counted.pushed % _PROGRESS_EVERY == 0:
+            self._answered()
 
     def _answered(self) -> None:
         if not self._goal.triggered:

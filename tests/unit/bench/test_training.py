@@ -90,6 +90,14 @@ def test_figures_are_of_an_update_and_the_rest_is_other() -> None:
     assert all(name.endswith("_a4") for name in metrics_of(measured(act=1.0), None, "_a4"))
 
 
+def test_what_goes_on_while_the_actor_acts_is_none_of_its_time() -> None:
+    run = measured(act=6.0, wait=3.0, answer=8.0)
+    for window in run.windows:
+        window.actors["wait.count"] = 5.0
+    assert metrics_of(run, None)["actor_other_ms"].median == pytest.approx(200.0)
+    assert bottleneck(run) == "actor act"
+
+
 def test_the_bottleneck_is_the_longest_stage_and_the_learners_when_actors_wait() -> None:
     assert bottleneck(measured(act=5.0, differentiate=4.0)) == "actor act"
     assert bottleneck(measured(act=1.0, answer=8.0)) == "learner apply"

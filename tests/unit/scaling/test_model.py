@@ -137,6 +137,13 @@ def test_progress_ends_with_all() -> None:
     assert told[-1] == 1.0
 
 
+def test_the_next_rollout_is_acted_while_the_learner_learns_from_the_last() -> None:
+    rollouts = costs(act=1.0, apply=0.8).adapted(learn_from="rollouts")
+    found = simulate(rollouts, setting())
+    assert found.updates_per_second == pytest.approx(1.0)
+    assert found.lag == 1.0
+
+
 def test_rollouts_have_neither_shards_nor_relays() -> None:
     rollouts = costs(act=1.0).adapted(learn_from="rollouts")
     for design in ({"shards": 2}, {"fan_out": 2}):
