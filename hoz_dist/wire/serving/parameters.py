@@ -63,6 +63,7 @@ class ParametersPublisher(Closing):
         clock: StageClock | None = None,
     ) -> None:
         self._keys = keys
+        self._head_key = KeyExpr(keys.params)
         self._clock = clock or StageClock()
         self._outgoing = Outgoing(memory or SharedMemory(on=False))
         self._rejections = rejections or Rejections()
@@ -103,7 +104,7 @@ class ParametersPublisher(Closing):
         epoch = newest.head.epoch
         try:
             check_question(query)
-            if query.key_expr.intersects(KeyExpr(self._keys.params)):
+            if query.key_expr.intersects(self._head_key):
                 answer(query, self._keys.params, newest.head)
                 return
             key = str(query.key_expr)

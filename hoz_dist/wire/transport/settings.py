@@ -28,10 +28,10 @@ _COMMON: Final[dict[str, Any]] = {
     "scouting/delay": 0,  # nothing is scouted for; a router would wait half a second for it all the same
     # On where it is wanted; see `shared_memory_settings`.
     "transport/shared_memory/enabled": False,
-    # The priority of questions and answers. 24 batches of 64 KiB hold the two shards of 512 KiB that may be on their
-    # way to a client, and some smaller answers: a router that forwards them to a client that stands still must not wait
-    # for it, because everybody else would wait too.
-    "transport/link/tx/queue/size/data": 24,
+    # The priority of questions and answers. 16 batches of 64 KiB, Zenoh's limit, hold the two shards of 384 KiB that may
+    # be on their way to a client, and some smaller answers: a router that forwards them to a client that stands still
+    # must not wait for it, because everybody else would wait too.
+    "transport/link/tx/queue/size/data": 16,
     "transport/link/rx/buffer_size": 4 * 1024 * 1024,
     "transport/link/rx/max_message_size": 128 * 1024 * 1024,
 }
