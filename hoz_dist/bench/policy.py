@@ -1,24 +1,26 @@
 """`hoz-dist bench policy`: frames that a policy acts in, and learns from, in a second."""
 
-from collections.abc import Iterator, Mapping, Sequence
+import statistics
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
-from typing import Final
+from typing import Final, get_args
 
 import torch
 
 from hoz_dist.a3c.differentiation import Differentiator
 from hoz_dist.a3c.rollout import Rollout
-from hoz_dist.bench.products import acting_products, run_products, training_products
+from hoz_dist.bench.products import Product, acting_products, run_products, training_products
 from hoz_dist.bench.report import Metric
 from hoz_dist.bench.samples import graph_bank, observations
-from hoz_dist.bench.timing import Contender, Contest, Progress, rate, run_contests
-from hoz_dist.config import RunConfig
+from hoz_dist.bench.timing import Contender, Contest, Progress, Samples, rate, run_contests
+from hoz_dist.config import PRESET_PRECISIONS, RunConfig
 from hoz_dist.nav.actions import Action
 from hoz_dist.nav.observation import Observation
 from hoz_dist.policy.navigator import Guidance
 from hoz_dist.policy.parameters import FlatParameters, make_policy
-from hoz_dist.policy.settings import Preset
+from hoz_dist.policy.settings import Precision, Preset
+from hoz_dist.policy.tape import dtype_of
 
 ACTING_BATCHES: Final = (1, 64)
 TRAINING_BATCHES: Final = (16, 64)
@@ -28,13 +30,14 @@ _UNIT: Final = "frames/s"
 def bench_policy(
     presets: Sequence[Preset], *, steps: int, seconds: float, repeats: int, progress: Progress
 ) -> dict[str, Metric]:
-    """Measure frames per second of method `hoz` in one thread; the limit is the matrix products alone, in float32.
+    """Measure frames per second of method `hoz` in one thread; the limit is the matrix products alone.
 
-    Acting is one step of B episodes. Training is the loss's gradient of a rollout of T steps of B episodes: with the
-    forward pass; and without that of the LSTM, from what acting recorded of it, as actors do.
+    Acting is T steps of B episodes. Training is the gradient of the loss of a rollout of T steps of B episodes: with
+    the forward pass; and without that of the LSTM, from what acting recorded of it, as actors do. The products are
+    those of a rollout in the best order, in the type in which they run faster of those that the policy uses.
 
     Args:
-        presets: Sizes of the network.
+        presets: Sizes of the network; each in its own precision.
         steps: T.
         seconds: Length of one measurement.
         repeats: Measurements of each figure.
@@ -44,49 +47,50 @@ def bench_policy(
     contests: dict[str, Contest] = {}
     for preset in presets:
         for batch in ACTING_BATCHES:
-            contests[f"policy_act_{preset}_b{batch}"] = partial(_acting, preset, batch, seconds)
+            name = f"policy_act_{preset}_b{batch}"
+            contests[name] = partial(_acting, name, _config(preset, steps, batch), seconds)
         for batch in TRAINING_BATCHES:
             for kind in ("train", "train_recorded"):
                 name = f"policy_{kind}_{preset}_b{batch}"
-                contests[name] = partial(_training, preset, steps, batch, seconds, recorded=kind != "train")
-    named = [partial(_named, name, contest) for name, contest in contests.items()]
-    samples = run_contests(named, repeats, progress)
-    return {name: Metric.of(samples[name], _UNIT, samples[f"{name}, products"]) for name in contests}
+                config = _config(preset, steps, batch)
+                contests[name] = partial(_training, name, config, seconds, recorded=kind != "train")
+    samples = run_contests(list(contests.values()), repeats, progress)
+    return {name: Metric.of(samples[name], _UNIT, _limit(samples, name)) for name in contests}
+
+
+def _config(preset: Preset, steps: int, batch: int) -> RunConfig:
+    return RunConfig(preset=preset, precision=PRESET_PRECISIONS[preset], batch=batch, rollout_steps=steps)
+
+
+def _limit(samples: Samples, name: str) -> float:
+    """Return the speed of the faster products."""
+    kinds = [f"{name}, {precision} products" for precision in get_args(Precision)]
+    return max(statistics.median(samples[kind]) for kind in kinds if kind in samples)
 
 
 @contextmanager
-def _named(name: str, contest: Contest) -> Iterator[Mapping[str, Contender]]:
-    with contest() as contenders:
-        yield {name: contenders["policy"], f"{name}, products": contenders["products"]}
-
-
-@contextmanager
-def _acting(preset: Preset, batch: int, seconds: float) -> Iterator[Mapping[str, Contender]]:
-    config = RunConfig(preset=preset, batch=batch)
+def _acting(name: str, config: RunConfig, seconds: float) -> Iterator[Mapping[str, Contender]]:
     policy, bank = make_policy(config.policy, config.seed), graph_bank(config.zones)
-    observation, state = observations(config.policy, batch), policy.initial_state(batch)
-    tape = policy.tape(1, batch)
+    observation, state = observations(config.policy, config.batch), policy.initial_state(config.batch)
+    tape = policy.tape(config.rollout_steps, config.batch)
 
     def act() -> None:
         nonlocal state
         tape.rewind()
-        state = policy.act(observation, state, bank, tape).state
+        for _ in range(config.rollout_steps):
+            state = policy.act(observation, state, bank, tape).state
 
+    once = acting_products(policy, config.batch)
+    products = [product._replace(times=product.times * config.rollout_steps) for product in once]
     with torch.no_grad():
-        products = run_products(acting_products(policy, batch))
-        yield {
-            "policy": lambda: rate(act, seconds) * batch,
-            "products": lambda: rate(products, seconds) * batch,
-        }
+        yield _contenders(name, act, products, config, seconds)
 
 
 @contextmanager
-def _training(
-    preset: Preset, steps: int, batch: int, seconds: float, *, recorded: bool
-) -> Iterator[Mapping[str, Contender]]:
-    config = RunConfig(preset=preset, batch=batch, rollout_steps=max(steps, 2))
+def _training(name: str, config: RunConfig, seconds: float, *, recorded: bool) -> Iterator[Mapping[str, Contender]]:
+    steps, batch = config.rollout_steps, config.batch
     policy, bank = make_policy(config.policy, config.seed), graph_bank(config.zones)
-    parameters = FlatParameters(policy)
+    differentiator = Differentiator(config, policy, FlatParameters(policy))
     observation, start = observations(config.policy, steps, batch), policy.initial_state(batch)
     tape = policy.tape(steps, batch)
     state, decisions = start, []
@@ -94,20 +98,28 @@ def _training(
         decisions.append(policy.act(Observation(*(part[t] for part in observation)), state, bank, tape))
         state = decisions[-1].state
     guidance = Guidance(*map(torch.stack, zip(*(decision.guidance for decision in decisions), strict=True)))
-    values = torch.stack([decision.value for decision in decisions])
-    rollout = _rollout(values)
-    differentiator = Differentiator(config, policy, parameters)
+    rollout = _rollout(torch.stack([decision.value for decision in decisions]))
 
     def differentiate() -> None:
         if not recorded:
             tape.rewind()
         differentiator.on_policy(rollout, observation, guidance, start, bank, tape)
 
-    products = run_products(training_products(policy, steps, batch, recorded=recorded))
-    yield {
-        "policy": lambda: rate(differentiate, seconds) * steps * batch,
-        "products": lambda: rate(products, seconds) * steps * batch,
-    }
+    yield _contenders(name, differentiate, training_products(policy, steps, batch, recorded=recorded), config, seconds)
+
+
+def _contenders(
+    name: str, work: Callable[[], None], products: Sequence[Product], config: RunConfig, seconds: float
+) -> Mapping[str, Contender]:
+    """Return what measures frames per second of some work of a whole rollout, and of its products alone."""
+    frames = config.rollout_steps * config.batch
+    precisions: tuple[Precision, ...] = tuple(dict.fromkeys(("fp32", config.precision)))
+    alone = {f"{name}, {precision} products": run_products(products, dtype_of(precision)) for precision in precisions}
+    return {who: partial(_frames_per_second, run, frames, seconds) for who, run in ({name: work} | alone).items()}
+
+
+def _frames_per_second(run: Callable[[], None], frames: int, seconds: float) -> float:
+    return rate(run, seconds) * frames
 
 
 def _rollout(values: torch.Tensor) -> Rollout:

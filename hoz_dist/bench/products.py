@@ -58,9 +58,9 @@ def training_products(policy: ActorCritic, steps: int, batch: int, *, recorded: 
     return forward + _backward(policy, steps, batch)
 
 
-def run_products(products: Sequence[Product]) -> Callable[[], None]:
-    """Return what runs products, each with operands and results of its own."""
-    ready = [(*_operands(product), product.times) for product in products]
+def run_products(products: Sequence[Product], dtype: torch.dtype = torch.float32) -> Callable[[], None]:
+    """Return what runs products of some type, each with operands and results of its own."""
+    ready = [(*_operands(product, dtype), product.times) for product in products]
 
     def run() -> None:
         for a, b, out, times in ready:
@@ -71,12 +71,12 @@ def run_products(products: Sequence[Product]) -> Callable[[], None]:
     return run
 
 
-def _operands(product: Product) -> tuple[Tensor, Tensor, Tensor]:
+def _operands(product: Product, dtype: torch.dtype) -> tuple[Tensor, Tensor, Tensor]:
     lead = () if product.side_by_side == 1 else (product.side_by_side,)
     return (
-        torch.randn(*lead, product.rows, product.inner),
-        torch.randn(*lead, product.inner, product.columns),
-        torch.empty(*lead, product.rows, product.columns),
+        torch.randn(*lead, product.rows, product.inner, dtype=dtype),
+        torch.randn(*lead, product.inner, product.columns, dtype=dtype),
+        torch.empty(*lead, product.rows, product.columns, dtype=dtype),
     )
 
 
