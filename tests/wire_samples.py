@@ -1,8 +1,9 @@
 """Valid messages and a small learner, for the tests of the wire and of the client."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
+from typing import get_args
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from hoz_dist.a3c.compression.compressor import Compressor
 from hoz_dist.config import Compression
 from hoz_dist.graph.room_graph import RoomGraph
 from hoz_dist.graph.scene_graph import SceneGraph
+from hoz_dist.nav.actions import NO_ACTION, Action
 from hoz_dist.nav.categories import TARGETS
 from hoz_dist.nav.episode import EpisodeResult
 from hoz_dist.nav.rooms import RoomId
@@ -21,6 +23,7 @@ from hoz_dist.wire.protocol.message import Message
 from hoz_dist.wire.protocol.parameters import ParametersDelta, ParametersHead, ParametersShard
 from hoz_dist.wire.protocol.pushes import EpisodesPush, GradientPush, RoomGraphPush
 from hoz_dist.wire.protocol.run_messages import ConfigReply, LeftProcess, ProcessStatus, StatusReply
+from hoz_dist.wire.protocol.trajectories import Flag, GraphUsed, RoomUsed, Steps, TrajectoryPush
 from hoz_dist.wire.serving.inbox import Inbox
 from hoz_dist.wire.serving.server import Server
 from hoz_dist.wire.serving.snapshots import Snapshots
@@ -73,6 +76,38 @@ def status_reply() -> StatusReply:
     return StatusReply(5, 1, processes, (LeftProcess("actor", "a1", "h1", 79, 2.5),), {"epoch": 1}, details)
 
 
+def steps_of(shape: tuple[int, int] = (5, 3), rooms: int = 1, seed: int = 0) -> Steps:
+    """T steps of B episodes, which begin and end as episodes do."""
+    rng, rows = np.random.default_rng(seed), (shape[0] + 1, shape[1])
+    action = rng.integers(0, 6, shape).astype(np.uint8)
+    flags = np.zeros(rows, np.uint8)
+    flags[0] = Flag.FIRST | Flag.FRESH
+    for t in range(shape[0]):
+        resets = (t > 0) & ((flags[t - 1] & (Flag.TERMINATED | Flag.TRUNCATED)) > 0)
+        done = (action[t] == Action.DONE) & ~resets
+        flags[t] |= ~resets * np.uint8(Flag.VALID) | done * np.uint8(Flag.TERMINATED)
+        flags[t + 1] |= resets * np.uint8(Flag.FIRST | Flag.FRESH)
+    slots = np.arange(shape[1]) % rooms
+    return Steps(
+        room=np.broadcast_to(slots, rows).astype(np.uint8),
+        view=rng.integers(0, 2000, rows).astype(np.uint16),
+        target=np.full(rows, 18, np.uint8),
+        flags=flags,
+        scene=np.zeros(rows, np.uint8),
+        current=rng.integers(0, 8, rows).astype(np.uint8),
+        subgoal=rng.integers(0, 8, rows).astype(np.uint8),
+        previous_action=np.full(shape[1], NO_ACTION, np.uint8),
+        action=action,
+        reward=np.full(shape, -0.01, np.float32),
+        log_probability=-rng.random(shape, dtype=np.float32),
+    )
+
+
+def trajectory_push(steps: Steps | None = None, rooms: int = 1) -> TrajectoryPush:
+    used = tuple(RoomUsed(RoomId("kitchen", number + 1), "0123456789abcdef" * 2) for number in range(rooms))
+    return TrajectoryPush("a0", 77, 2, 1, 5, used, (GraphUsed("kitchen", 1, 2),), steps or steps_of(rooms=rooms))
+
+
 HEAD = ParametersHead(epoch=1, version=5, size=100)
 MESSAGES: tuple[Message, ...] = (
     gradient_push(),
@@ -89,9 +124,11 @@ MESSAGES: tuple[Message, ...] = (
     room_graph_reply(room_graph(), 1),
     PlanReply(1, 0, 3, 2, (0, 2, 3), 0.25),
     status_reply(),
-    *(gradient_push_in(codec) for codec in ("bf16", "int8", "topk")),
+    trajectory_push(),
 )
-"""One message of every kind, and a gradient in every form."""
+"""One message of every kind."""
+GRADIENTS: Mapping[Compression, GradientPush] = {codec: gradient_push_in(codec) for codec in get_args(Compression)}
+"""A gradient in every form."""
 
 
 @contextmanager

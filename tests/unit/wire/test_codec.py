@@ -21,6 +21,7 @@ from tests import wire_samples as samples
 from tests.mutations import joined, split
 
 KINDS = tuple(MESSAGES.values())
+ALL = (*samples.MESSAGES, *samples.GRADIENTS.values())
 
 
 def fields_of(message: Message) -> dict[str, Any]:
@@ -100,8 +101,8 @@ def test_decoding_a_gradient_does_not_copy_it_again() -> None:
 
 @pytest.mark.parametrize("codec", ["bf16", "int8", "topk"])
 def test_a_gradient_of_another_form_arrives_as_it_was(codec: Compression) -> None:
-    sent = samples.gradient_push_in(codec).gradient
-    came = decode(encode(samples.gradient_push_in(codec)), GradientPush).gradient
+    sent = samples.GRADIENTS[codec].gradient
+    came = decode(encode(samples.GRADIENTS[codec]), GradientPush).gradient
     assert type(came) is type(sent)
     assert not isinstance(came, np.ndarray)
     for mine, theirs in zip(came, sent, strict=True):
@@ -118,9 +119,9 @@ TENSOR = fields_of(PUSH)["gradient"]["values"]
 BULK = split(encode(PUSH))[1]
 HEAD = encode(PUSH)[: -len(BULK)]
 assert HEAD[-1] == 0, "the map is padded"
-HALVES = samples.gradient_push_in("bf16")
-LEVELS = samples.gradient_push_in("int8")
-LARGEST = samples.gradient_push_in("topk")
+HALVES = samples.GRADIENTS["bf16"]
+LEVELS = samples.GRADIENTS["int8"]
+LARGEST = samples.GRADIENTS["topk"]
 
 
 def of(push: GradientPush, name: str) -> dict[str, Any]:
@@ -353,7 +354,7 @@ MSGPACK_VALUES = st.recursive(
 @settings(max_examples=400, deadline=None)
 @given(st.data())
 def test_messages_with_any_field_replaced_are_decoded_or_rejected(data: st.DataObject) -> None:
-    fields, bulk = split(encode(data.draw(st.sampled_from(samples.MESSAGES))))
+    fields, bulk = split(encode(data.draw(st.sampled_from(ALL))))
     name = data.draw(st.sampled_from(sorted(fields)))
     inner = fields[name]
     if isinstance(inner, dict) and inner and data.draw(st.booleans()):
@@ -366,7 +367,7 @@ def test_messages_with_any_field_replaced_are_decoded_or_rejected(data: st.DataO
 @settings(max_examples=300, deadline=None)
 @given(st.data())
 def test_damaged_messages_are_decoded_or_rejected(data: st.DataObject) -> None:
-    damaged = bytearray(encode(data.draw(st.sampled_from(samples.MESSAGES))))
+    damaged = bytearray(encode(data.draw(st.sampled_from(ALL))))
     for _ in range(data.draw(st.integers(1, 8))):
         damaged[data.draw(st.integers(0, len(damaged) - 1))] = data.draw(st.integers(0, 255))
     cut = data.draw(st.integers(0, len(damaged)))

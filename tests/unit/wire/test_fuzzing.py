@@ -16,7 +16,7 @@ from tests import wire_samples as samples
 from tests.mutations import MUTATIONS, Mutation, encoded, mutated
 
 KINDS = tuple(MESSAGES.values())
-VALID = encoded(*samples.MESSAGES)
+VALID = encoded(*samples.MESSAGES, *samples.GRADIENTS.values())
 SEED = 20210816
 
 

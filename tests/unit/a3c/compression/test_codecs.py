@@ -60,6 +60,14 @@ def test_int8_of_zeros_and_of_the_smallest_numbers_is_finite() -> None:
     np.testing.assert_allclose(received(sent) + rest, values, atol=1e-7)
 
 
+def uneven(size: int) -> Vector:
+    return vector(2, size)
+
+
+def nothing(size: int) -> Vector:
+    return np.zeros(size, np.float32)
+
+
 def tied(size: int) -> Vector:
     return np.where(np.arange(size) % 3 == 0, 1.0, -1.0).astype(np.float32)
 
@@ -73,7 +81,7 @@ def one(size: int) -> Vector:
     return np.eye(1, size, size // 2, dtype=np.float32)[0]
 
 
-@pytest.mark.parametrize("make", [lambda size: vector(2, size), tied, periodic, one, lambda size: np.zeros(size, "f4")])
+@pytest.mark.parametrize("make", [uneven, tied, periodic, one, nothing])
 @pytest.mark.parametrize("size", [*SIZES, 200_003])
 def test_topk_sends_the_largest(size: int, make: Callable[[int], Vector]) -> None:
     values = make(size)
@@ -98,7 +106,7 @@ def test_nothing_that_is_sent_is_longer_than_the_bound(codec: type[Bf16 | Int8 |
     for values in (np.full(1024, just_above_half), some, vector(4, norm=50.0)):
         sent, _ = taken(codec, values, 2.0)
         norm = np.linalg.norm(received(sent).astype(np.float64))
-        assert 1.98 < norm <= 2.0 * (1 + 1e-6)
+        assert 1.98 < norm <= 2.0 * (1 + 1e-5)
 
 
 @pytest.mark.parametrize("codec", CODECS)

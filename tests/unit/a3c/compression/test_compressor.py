@@ -39,11 +39,11 @@ def test_what_is_sent_adds_up_to_the_gradients_less_an_error_that_does_not_grow(
 
 
 def test_entries_too_small_for_a_codec_arrive_in_the_end() -> None:
-    gradient = np.full(SIZE, 1e-6, np.float32)
+    gradient = np.full(SIZE, 1e-5, np.float32)
     gradient[:3] = 1.0
-    sent, wanted = sums("int8", [gradient] * 4000)
+    sent, wanted = sums("int8", [gradient] * 1000)
     np.testing.assert_allclose(sent[3:256], wanted[3:256], atol=0.008)
-    assert wanted[5] == pytest.approx(0.004, rel=1e-3)
+    assert wanted[5] == pytest.approx(0.01, rel=1e-3)
 
 
 def test_every_entry_of_a_gradient_that_never_changes_is_sent_and_the_error_is_bounded() -> None:
