@@ -128,20 +128,12 @@ class RolloutGradients:
         bank = self._bank(push.graphs)
         views = np.array([room.start for room in rooms])[steps.room] + steps.view
         self._check_moves(steps, views)
-        scenes = np.array([scene_index(room.views.room.scene) for room in rooms])
-
         before = self._states.before(push.actor, push.incarnation, push.sequence)
         batch = steps.action.shape[1]
         start = self._policy.initial_state(batch) if before is None else before.state
         known = _known(torch.zeros(batch, dtype=torch.bool) if before is None else before.known, steps)
         behaviour = _behaviour(steps, known)
-        observation = Observation(
-            *self._source.look(views),
-            target=steps.target.astype(np.int64),
-            previous_action=_previous_actions(steps),
-            scene=scenes[steps.room],
-            first=steps.has(Flag.FIRST),
-        )
+        observation = self._observation(steps, views, rooms)
         guidance = Guidance(
             scene=_long(steps.scene),
             fresh=torch.from_numpy(steps.has(Flag.FRESH)),
@@ -154,6 +146,17 @@ class RolloutGradients:
             raise RejectedError(Reason.INTERNAL, "the gradient of the rollout is not finite")
         self._states.keep(push.actor, Ended.after(push, state, known[-1]))
         return Learnt(gradient, int(behaviour.valid.sum()), loss)
+
+    def _observation(self, steps: Steps, views: NDArray[np.int64], rooms: list[_OpenRoom]) -> Observation:
+        """Return what the actor observed at views over all rooms, [T + 1, B, ...]."""
+        scenes = np.array([scene_index(room.views.room.scene) for room in rooms])
+        return Observation(
+            *self._source.look(views),
+            target=steps.target.astype(np.int64),
+            previous_action=_previous_actions(steps),
+            scene=scenes[steps.room],
+            first=steps.has(Flag.FIRST),
+        )
 
     def _check(self, push: TrajectoryPush, rooms: list[_OpenRoom]) -> None:
         """Judge a rollout by the run's configuration and by the rooms."""
