@@ -146,7 +146,8 @@ class _Run:
             self._goal.succeed()
 
     def _make_link(self, flow: float) -> Link:
-        return Link(self._env, math.inf if self._setting.one_host else self._setting.hub_bandwidth, flow)
+        bandwidth = math.inf if self._setting.one_host else self._setting.hub_bandwidth
+        return Link(self._env, bandwidth, flow, self._rng)
 
     def _make_relay(self, above: Node, flow: float, clients: int) -> Node:
         host = Shared(self._env, self._setting.cores, self._costs.crowding)

@@ -4,6 +4,7 @@ What it does with a push is another's to say; see `hoz_dist.scaling.learner` and
 """
 
 import math
+import random
 from collections.abc import Generator
 from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
@@ -63,11 +64,12 @@ class Link:
         env: Simulation.
         bandwidth: Bits/s; infinitely many for a loopback, whose cost is Zenoh's CPU time alone.
         flow: Bits/s at which one message travels at most, because the other end's link is no faster.
+        rng: Source of the luck with which messages share it.
     """
 
-    def __init__(self, env: simpy.Environment, bandwidth: float, flow: float) -> None:
+    def __init__(self, env: simpy.Environment, bandwidth: float, flow: float, rng: random.Random) -> None:
         units = math.inf if math.isinf(bandwidth) else bandwidth / flow
-        self.up, self.down = Shared(env, units), Shared(env, units)
+        self.up, self.down = Shared(env, units, uneven=rng), Shared(env, units, uneven=rng)
         self._flow = flow
 
     def seconds(self, size: float) -> float:

@@ -1,12 +1,15 @@
 """Resources that their users share evenly: the cores of a host, the bandwidth of a link."""
 
 import math
+import random
 from collections.abc import Callable
 from heapq import heappop, heappush
 from typing import Any, Final
 
 import simpy
 
+UNEVEN: Final = 0.5
+"""How much more or less than their share some get where it is uneven."""
 _ROUNDING: Final = 1e-12
 """Relative error of times that are added up; work that is this near its end is done."""
 
@@ -22,12 +25,21 @@ class Shared:
         env: Simulation.
         units: How many users go at full speed; need not be whole. Infinitely many: one for each user.
         crowding: Share by which work takes longer while all units are in use; cores share caches and memory.
+        uneven: Source of luck, for users that do not share exactly evenly, as flows of TCP: those that come at the same
+            moment would otherwise be done at the same moment, and stay in step for ever. None for exact shares.
     """
 
-    def __init__(self, env: simpy.Environment, units: float = math.inf, crowding: float = 0.0) -> None:
+    def __init__(
+        self,
+        env: simpy.Environment,
+        units: float = math.inf,
+        crowding: float = 0.0,
+        uneven: random.Random | None = None,
+    ) -> None:
         self._env = env
         self.units = units
         self._crowding = crowding
+        self._uneven = uneven
         self._users: list[tuple[float, int, simpy.Event]] = []
         """What each one's progress must reach, its number, and what happens then."""
         self._number = 0
@@ -48,6 +60,8 @@ class Shared:
             self._used += work
             return self._env.timeout(work)
         self._get_on()
+        if self._uneven is not None and self._users:
+            work *= self._uneven.uniform(1.0 - UNEVEN, 1.0 + UNEVEN)
         event = self._env.event()
         self._number += 1
         heappush(self._users, (self._progress + work, self._number, event))

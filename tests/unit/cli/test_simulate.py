@@ -18,8 +18,8 @@ def file(tmp_path: Path) -> str:
 
 def test_several_numbers_of_actors_give_a_table(file: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["simulate", "--costs", file, "--actors", "1,2", "--actors", "3"]) == 0
-    rows = [line.split() for line in capsys.readouterr().out.splitlines() if "│" in line]
-    assert [row[1] for row in rows] == ["1", "2", "3"]
+    rows = [line.split("│") for line in capsys.readouterr().out.splitlines() if "│" in line]
+    assert [row[2].strip() for row in rows] == ["1", "2", "3"]
 
 
 def test_json_has_every_figure_of_every_number(file: str, capsys: pytest.CaptureFixture[str]) -> None:
