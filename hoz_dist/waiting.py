@@ -13,6 +13,10 @@ LONGER_TRIES: Final = 16
 """How many times as long the longest try waits: over a link that loses packets a gradient may take half a minute."""
 
 
+_RANDOM: Final = random.Random()
+"""Of our own: a program that seeds Python's would make all its actors wait alike."""
+
+
 class StoppedError(Exception):
     """The process was told to stop while it waited; not a failure."""
 
@@ -45,7 +49,6 @@ class Backoff:
 
     def __init__(self, stop: threading.Event) -> None:
         self._stop = stop
-        self._random = random.Random()
         self._longest = FIRST_PAUSE_S
 
     def pause(self, deadline: Deadline) -> None:
@@ -54,7 +57,7 @@ class Backoff:
         Raises:
             StoppedError: The stop event was set.
         """
-        length = self._random.uniform(self._longest / 2, self._longest)
+        length = _RANDOM.uniform(self._longest / 2, self._longest)
         self._longest = min(2 * self._longest, LONGEST_PAUSE_S)
         if self._stop.wait(deadline.within(length)):
             raise StoppedError

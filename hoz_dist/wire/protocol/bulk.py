@@ -5,22 +5,13 @@ order of the fields of its kind, each with zeros up to a multiple of 64. The map
 """
 
 from collections.abc import Iterator, Mapping
-from typing import Any, Final, NamedTuple, Protocol, runtime_checkable
+from typing import Any, Final, NamedTuple
 
 from hoz_dist.wire.protocol.rejection import Reason, RejectedError
-from hoz_dist.wire.protocol.schema import Spec, Tensor, map_of
+from hoz_dist.wire.protocol.schema import Nest, Spec, Tensor, map_of
 
 ALIGNMENT: Final = 64
 """Bytes; that of a cache line, and of the widest vector registers."""
-
-
-@runtime_checkable
-class Nest(Protocol):
-    """A spec whose values are maps of fields that have specs themselves."""
-
-    def inner(self, raw: Mapping[str, Any]) -> Mapping[str, Spec]:
-        """Return the specs of the fields of a map, which may hold anything."""
-        ...
 
 
 class Layout(NamedTuple):
@@ -81,7 +72,7 @@ class BulkReader:
             if isinstance(spec, Tensor) and spec.bulk and name in fields:
                 description = map_of(raw, Tensor.DESCRIPTION, name)
                 fields[name] = description | {"data": self._take(spec.bytes_of(description, name), name)}
-            elif isinstance(spec, Nest) and type(raw) is dict:
+            elif type(raw) is dict and isinstance(spec, Nest):
                 self.attach(spec.inner(raw), raw)
 
     def finish(self) -> None:

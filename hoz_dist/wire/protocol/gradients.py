@@ -8,7 +8,7 @@ import numpy as np
 from hoz_dist.gradient_forms import Bf16Gradient, Gradient, Int8Gradient, TopKGradient, blocks_of
 from hoz_dist.wire.protocol.message import MAX_PARAMETERS
 from hoz_dist.wire.protocol.rejection import Reason, RejectedError, shown
-from hoz_dist.wire.protocol.schema import Int, Spec, Tensor, map_of, wrong_type
+from hoz_dist.wire.protocol.schema import Int, Nest, Spec, Tensor, map_of, wrong_type
 
 LARGEST_SCALE: Final = 2.0**120
 """Of an `Int8Gradient`: 127 steps of that size are still finite."""
@@ -24,7 +24,7 @@ class _Form(NamedTuple):
     """Specs of its fields."""
 
 
-class GradientField:
+class GradientField(Nest):
     """Spec of a `Gradient`; on the wire a map of ``codec`` and the fields of the form, bulk tensors among them."""
 
     FORMS: ClassVar[Mapping[str, _Form]] = {

@@ -5,6 +5,7 @@ hold (`pack`), back (`unpack`: structure only), and judges a value (`check`). A 
 it is made, so what is sent and what is received obey the same rules, and a large tensor is looked at only once.
 """
 
+import abc
 import dataclasses
 import math
 import re
@@ -63,6 +64,14 @@ class Spec(Protocol):
             RejectedError: The value is not allowed.
         """
         ...
+
+
+class Nest(abc.ABC):
+    """Base of the specs whose values are maps of fields that have specs themselves."""
+
+    @abc.abstractmethod
+    def inner(self, raw: Mapping[str, Any]) -> Mapping[str, Spec]:
+        """Return the specs of the fields of a map, which may hold anything."""
 
 
 class Scalar:
@@ -271,7 +280,7 @@ class Many:
 
 
 @dataclasses.dataclass(frozen=True)
-class Record:
+class Record(Nest):
     """A nested `Structure`; a map on the wire."""
 
     of: "type[Structure]"
