@@ -10,10 +10,11 @@ from hoz_dist.wire.client.epochs import AnotherRunError
 from hoz_dist.wire.client.parameters import ParametersFollower
 from hoz_dist.wire.membership.liveliness import Members
 from hoz_dist.wire.protocol.answers import Refused
-from hoz_dist.wire.protocol.codec import decode
+from hoz_dist.wire.protocol.codec import checksum, decode
 from hoz_dist.wire.protocol.graph_messages import SceneGraphReply
 from hoz_dist.wire.protocol.message import SHARD_ELEMENTS
-from hoz_dist.wire.protocol.parameters import ParametersHead
+from hoz_dist.wire.protocol.parameters import ParametersDelta, ParametersHead, ParametersShard, digest_of
+from hoz_dist.wire.serving.bases import LONGEST_LIFE
 from hoz_dist.wire.serving.parameters import ParametersPublisher
 from hoz_dist.wire.serving.server import Server
 from hoz_dist.wire.serving.snapshots import Snapshots
@@ -70,11 +71,12 @@ def test_a_follower_gets_the_newest_parameters(learner: Server, client: Session,
         assert decode(answer.payload, ParametersHead).stamp == head.stamp
 
 
-def test_parameters_of_several_shards_are_never_mixed(learner: Server, client: Session) -> None:
+@pytest.mark.parametrize("deltas", [False, True], ids=["full", "deltas"])
+def test_parameters_of_several_shards_are_never_mixed(learner: Server, client: Session, deltas: bool) -> None:
     stop = threading.Event()
-    size = 2 * SHARD_ELEMENTS + 5
+    size = 4 * SHARD_ELEMENTS + 5
     with (
-        ParametersFollower(client, KEYS, threading.Event()) as follower,
+        ParametersFollower(client, KEYS, threading.Event(), deltas=deltas) as follower,
         ParametersPublisher(learner.session, KEYS) as publisher,
     ):
         publisher.publish(1, 0, np.zeros(size, np.float32))
@@ -91,10 +93,68 @@ def test_parameters_of_several_shards_are_never_mixed(learner: Server, client: S
         for _ in range(8):
             fetched = follower.fetch(timeout_s=WAIT_S)
             stamps.append(fetched.head.stamp)
-            assert (fetched.vector == fetched.head.version).all()
+            assert (fetched.vector == fetched.vector[0]).all()
+            # A delta of so many whole steps may be off by their rounding.
+            assert fetched.vector[0] == pytest.approx(fetched.head.version, rel=1e-5 if deltas else 0.0)
         stop.set()
         thread.join(WAIT_S)
     assert stamps == sorted(stamps)
+
+
+def test_a_reader_of_deltas_gets_a_base_in_full_and_then_a_byte_for_each_parameter(
+    learner: Server, client: Session
+) -> None:
+    rng = np.random.default_rng(5)
+    vector = rng.normal(size=1000).astype(np.float32)
+    with (
+        ParametersPublisher(learner.session, KEYS) as publisher,
+        ParametersFollower(client, KEYS, threading.Event(), deltas=True) as follower,
+    ):
+        publisher.publish(1, 0, vector)
+        np.testing.assert_array_equal(follower.fetch(timeout_s=WAIT_S).vector, vector)
+        base = digest_of(vector)
+        (same,) = ask(client, f"{KEYS.shard(0)}?reader=a;base={base}", timeout_s=5.0)
+        assert decode(same.payload, ParametersHead).stamp == (1, 0), "what it has is the newest"
+        for version in range(1, 3 * LONGEST_LIFE, 100):
+            vector = vector + rng.normal(scale=1e-3, size=1000).astype(np.float32)
+            publisher.publish(1, version, vector)
+            fetched = follower.fetch((1, version), WAIT_S)
+            assert fetched.head.version == version
+            np.testing.assert_allclose(fetched.vector, vector, atol=1e-4)
+        # Who has the first base, or none, gets the one of now.
+        for held in (base, "none"):
+            (answer,) = ask(client, f"{KEYS.shard(0)}?reader=b;base={held}", timeout_s=5.0)
+            now = decode(answer.payload, ParametersShard)
+        (answer,) = ask(client, f"{KEYS.shard(0)}?reader=b;base={digest_of(now.values)}", timeout_s=5.0)
+        delta = decode(answer.payload, ParametersDelta)
+        assert delta.head.version == version
+        assert len(answer.payload) < 1.5 * vector.size
+        assert answer.checksum == checksum(answer.payload)
+
+
+def test_a_reader_of_deltas_goes_on_with_the_learner_of_another_epoch(endpoint: str) -> None:
+    vector = np.linspace(-1, 1, 1000, dtype=np.float32)
+    with (
+        open_router(endpoint) as session,
+        open_client(endpoint) as client,
+        ParametersFollower(client, KEYS, threading.Event(), deltas=True) as follower,
+    ):
+        # The new learner begins with what the old one had two versions before.
+        for epoch, first in ((1, 5), (2, 4)):
+            with ParametersPublisher(session, KEYS) as publisher:
+                for version in (first, first + 1):
+                    publisher.publish(epoch, version, vector + np.float32(version))
+                    fetched = follower.fetch((epoch, version), WAIT_S)
+                    assert fetched.head.stamp == (epoch, version)
+                    np.testing.assert_allclose(fetched.vector, vector + version, atol=1e-2)
+
+
+@pytest.mark.parametrize("base", ["", "NONE", "0123456789abcde", "0123456789ABCDEF"])
+def test_a_base_that_cannot_be_one_is_refused(learner: Server, client: Session, base: str) -> None:
+    with ParametersPublisher(learner.session, KEYS, learner.rejections) as publisher:
+        publisher.publish(1, 0, np.zeros(3, np.float32))
+        (answer,) = ask(client, f"{KEYS.shard(0)}?reader=a;base={base}", timeout_s=5.0)
+        assert decode(answer.payload, Refused).reason == "name"
 
 
 def test_who_does_not_begin_with_the_first_shard_is_refused_and_nothing_is_kept(

@@ -16,6 +16,7 @@ from zenoh.handlers import FifoChannel
 from hoz_dist.wire.client.parameters import ParametersFollower
 from hoz_dist.wire.client.push import Pusher
 from hoz_dist.wire.protocol.answers import Accepted
+from hoz_dist.wire.protocol.parameters import ParametersShard, shards_of
 from hoz_dist.wire.protocol.pushes import GradientPush
 from hoz_dist.wire.serving.parameters import ParametersPublisher
 from hoz_dist.wire.serving.server import Server
@@ -212,7 +213,7 @@ def test_gradients_and_parameters_pass_through_it(endpoint: str, memory: SharedM
     ):
         head = publisher.publish(1, 5, parameters)
         assert np.array_equal(follower.fetch((1, 5), timeout_s=20.0).vector, parameters)
-        assert (of_learner.shared, of_learner.fallbacks) == (head.shards, 0)
+        assert (of_learner.shared, of_learner.fallbacks) == (shards_of(head.size, ParametersShard), 0)
         pusher = Pusher(client, stop, memory=memory)
         with answering(server.inbox, lambda _: Accepted(1, 6)) as came:
             assert isinstance(pusher.push(GRADS, gradient, deadline_s=20.0), Accepted)

@@ -110,8 +110,11 @@ def test_the_parameters_of_the_examples_belong_together() -> None:
 
 
 def test_the_documented_limits_are_those_of_the_code() -> None:
-    assert f"shards of {SHARD_ELEMENTS:,} values (512 KiB)" in DOCUMENT
+    assert f"shards of {SHARD_ELEMENTS:,} values (384 KiB)" in DOCUMENT
     assert f"shards of {ParametersDelta.LENGTH:,} values" in DOCUMENT
+    for part in (ParametersShard, ParametersDelta):
+        assert f"| {part.LENGTH:,} of them in all shards but the last" in section(part.KIND)
+        assert f"At most {part.MOST_BYTES >> 10} KiB." in section(part.KIND)
     assert f"one for each {BLOCK} values" in DOCUMENT
     assert f"about every {LONGEST_LIFE} versions" in DOCUMENT
     assert MOST_UNDER_WAY == 2, "two questions may be without their answer"
