@@ -6,10 +6,11 @@ Runs take turns: while one is measured the processes of the others stand still.
 import statistics
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import Any, Final
+from functools import partial
+from typing import Final
 
 from hoz_dist.bench.report import Metric
 from hoz_dist.bench.timing import Contender, Progress, run_contests
@@ -133,7 +134,7 @@ class Measured:
         self.windows.append(Window(end - begin, actors, learner))
         return self.windows[-1].frames_per_second
 
-    def median(self, figure: Any) -> float:
+    def median(self, figure: Callable[[Window], float]) -> float:
         """Return the median over the windows of a function of a window."""
         return statistics.median(figure(window) for window in self.windows)
 
@@ -156,7 +157,7 @@ def measure_in_turns(
 
     @contextmanager
     def contest() -> Iterator[Mapping[str, Contender]]:
-        yield {name: lambda one=one: one.measure(seconds) for name, one in measured.items()}
+        yield {name: partial(one.measure, seconds) for name, one in measured.items()}
 
     run_contests([contest], repeats, progress)
     for one in measured.values():

@@ -16,7 +16,6 @@ from hoz_dist.bench.timing import Contender, Progress, rate, run_contests
 from hoz_dist.config import Compression, RunConfig
 from hoz_dist.nav.episode import EpisodeResult
 from hoz_dist.nav.rooms import RoomId
-from hoz_dist.policy.parameters import initial_parameters
 from hoz_dist.wire.client.parameters import ParametersFollower
 from hoz_dist.wire.client.push import Pusher
 from hoz_dist.wire.protocol.answers import Accepted
@@ -51,7 +50,7 @@ def bench_wire(
         endpoint: Where a receiver listens.
         shared_endpoint: Where a receiver listens that has shared memory on.
         parameters: P, which both serve, and a gradient has.
-        codecs: Codecs of which to tell the bytes of a gradient of the paper's size.
+        codecs: Codecs of which to tell the bytes of a gradient.
         seconds: Length of one measurement.
         repeats: Measurements of each figure.
         progress: Told how far the work is.
@@ -62,21 +61,20 @@ def bench_wire(
     ]
     samples = run_contests(contests, repeats, progress)
     copy = samples["copy"]
+    sizes = {codec: bytes_of_gradient(codec, parameters) for codec in codecs}
     return {
         "wire_push_ms": Metric.of(samples["push"], "ms", copy),
         "wire_push_shared_memory_ms": Metric.of(samples["push, shared memory"], "ms", copy),
         "wire_fetch_ms": Metric.of(samples["fetch"], "ms", copy),
         "wire_fetch_shared_memory_ms": Metric.of(samples["fetch, shared memory"], "ms", copy),
         "wire_small_push_ms": Metric.of(samples["small push"], "ms", samples["bare question"]),
-        **{f"wire_gradient_bytes_{codec}": Metric.of([bytes_of_gradient(codec)], "bytes") for codec in codecs},
+        **{f"wire_gradient_bytes_{codec}": Metric.of([size], "bytes") for codec, size in sizes.items()},
     }
 
 
-def bytes_of_gradient(codec: Compression) -> int:
-    """Return the length of a push of a gradient of the paper's size."""
-    config = RunConfig(preset="paper", compress=codec)
-    vector = gradient(initial_parameters(config.policy, config.seed).size)
-    compressed = Compressor(codec, vector.size, config.gradient_norm).compress(vector)
+def bytes_of_gradient(codec: Compression, size: int) -> int:
+    """Return the length of a push of a gradient [P] that travels by a codec."""
+    compressed = Compressor(codec, size, RunConfig.gradient_norm).compress(gradient(size))
     return len(encode(GradientPush(ACTOR, 1, 0, EPOCH, 0, 1, compressed)))
 
 

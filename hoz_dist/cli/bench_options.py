@@ -49,6 +49,8 @@ compress_option = click.option(
     show_default="all",
     help="How the gradient travels; may be repeated.",
 )
+_LEAST_WIDTH: Final = 118
+"""Of a table, columns; names of figures are cut in narrower ones."""
 Measure = Callable[..., "Mapping[str, Metric]"]
 
 
@@ -76,6 +78,7 @@ def show_metrics(metrics: "Mapping[str, Metric]", *, as_json: bool, more: "Mappi
         echo_json(report.to_json() | dict(more or {}))
         return
     console = Console()
+    console = Console(width=max(console.width, _LEAST_WIDTH))
     console.print(_table(report))
     for name, text in (more or {}).items():
         console.print(f"{name}: {text}", markup=False, highlight=False)
@@ -107,7 +110,7 @@ def _table(report: "Report") -> "Table":
     from rich.table import Table
 
     table = Table(title=report.command, title_justify="left")
-    table.add_column("figure")
+    table.add_column("figure", no_wrap=True)
     for name in ("median", "least", "largest"):
         table.add_column(name, justify="right")
     table.add_column("unit")
