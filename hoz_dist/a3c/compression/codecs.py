@@ -23,8 +23,8 @@ _LEVELS: Final = 127.0
 """Largest number of steps in an `Int8Gradient`."""
 _SAMPLE: Final = 65_536
 """Entries that `TopK` looks at to guess where the largest ones begin."""
-_PIECE: Final = 512
-"""Blocks of an `Int8Gradient` that are worked on at once: they stay in the cache."""
+_PIECE: Final = 512 * INT8_BLOCK
+"""Entries that are worked on at once where several passes are needed: they stay in the cache."""
 
 
 class Codec(Protocol):
@@ -56,8 +56,9 @@ class Bf16:
     def take(self, vector: Tensor, largest: float) -> Bf16Gradient:
         """See `Codec.take`."""
         clip_norm(vector, largest / _BF16_ROUNDS_UP)
-        self._halves.copy_(vector)
-        vector.sub_(self._halves)
+        for values, halves in zip(vector.split(_PIECE), self._halves.split(_PIECE), strict=True):
+            halves.copy_(values)
+            values.sub_(halves.float())
         return Bf16Gradient(_bits(self._halves))
 
 
@@ -80,9 +81,10 @@ class Int8:
         clip_norm(vector, largest)
         sent = self._padded.view(-1)[: self._size]
         sent.copy_(vector)
-        pieces = (tensor.split(_PIECE) for tensor in (self._padded, self._levels, self._scales))
+        pieces = (tensor.split(_PIECE // INT8_BLOCK) for tensor in (self._padded, self._levels, self._scales))
         for values, levels, scales in zip(*pieces, strict=True):
-            torch.div(torch.linalg.vector_norm(values, torch.inf, dim=1, keepdim=True), _LEVELS, out=scales)
+            highest, lowest = values.amax(dim=1, keepdim=True), values.amin(dim=1, keepdim=True)
+            torch.div(torch.maximum(highest, -lowest), _LEVELS, out=scales)
             # A block of zeros, or of numbers so small that its scale is 0, has no steps at all.
             values.div_(scales.masked_fill(scales == 0.0, 1.0)).round_().clamp_(-_LEVELS, _LEVELS)
             levels.copy_(values)

@@ -1,10 +1,15 @@
 """What the learner makes of a gradient that it received."""
 
+from typing import Final
+
 import numpy as np
 import torch
 
 from hoz_dist.a3c.compression.borrowing import borrowed
 from hoz_dist.gradient_forms import INT8_BLOCK, Bf16Gradient, Gradient, Int8Gradient, TopKGradient, Vector
+
+_ROWS: Final = 512
+"""Blocks of an `Int8Gradient` that are worked on at once: they stay in the cache."""
 
 
 class Decompressor:
@@ -52,6 +57,7 @@ def _expand(levels: torch.Tensor, scales: torch.Tensor, vector: torch.Tensor) ->
     """Multiply the levels of each block by its scale; the last block may be a short one."""
     whole = levels.numel() // INT8_BLOCK
     end = whole * INT8_BLOCK
-    rows = (whole, INT8_BLOCK)
-    torch.mul(levels[:end].view(rows), scales[:whole, None], out=vector[:end].view(rows))
+    rows = (levels[:end].view(whole, INT8_BLOCK), scales[:whole, None], vector[:end].view(whole, INT8_BLOCK))
+    for some_levels, some_scales, values in zip(*(row.split(_ROWS) for row in rows), strict=True):
+        values.copy_(some_levels).mul_(some_scales)
     torch.mul(levels[end:], scales[whole:], out=vector[end:])
