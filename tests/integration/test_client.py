@@ -69,7 +69,7 @@ def test_a_client_gets_graphs_plans_status_and_configuration(client: HozClient) 
     assert client.runs() == ["run-1"]
     config = client.config()
     assert config == {
-        "protocol": 1,
+        "protocol": 2,
         "run": "run-1",
         "epoch": 1,
         "categories": list(TARGETS),
