@@ -50,9 +50,7 @@ class RoomOpener(Closing):
         self._asked: set[RoomId] = set()
         """Rooms that are, or will be, open."""
         self._closed = threading.Event()
-        self._outage = Outage(
-            _log, "cannot open the views of rooms (%s); their rollouts wait", "rooms are opened again"
-        )
+        self._outage = Outage(_log, "cannot open the views of a room (%s); its rollouts wait", "rooms are opened again")
         self._thread = threading.Thread(target=self._run, name="hoz opens rooms", daemon=True)
         self._thread.start()
 
