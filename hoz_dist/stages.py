@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 class StageTotal(NamedTuple):
     """What a stage has taken so far, less the stages within it."""
 
-    count: int = 0
+    passages: int = 0
     """How often it was gone through."""
     wall_seconds: float = 0.0
     cpu_seconds: float = 0.0
@@ -66,7 +66,7 @@ class StageClock:
             "cpu_seconds": round(time.process_time(), 6),
             "stages": {
                 name: {
-                    "count": total.count,
+                    "count": total.passages,
                     "wall_seconds": round(total.wall_seconds, 6),
                     "cpu_seconds": round(total.cpu_seconds, 6),
                 }
@@ -77,7 +77,7 @@ class StageClock:
     def _add(self, stage: str, wall: float, cpu: float) -> None:
         with self._lock:
             total = self._totals[stage]
-            self._totals[stage] = StageTotal(total.count + 1, total.wall_seconds + wall, total.cpu_seconds + cpu)
+            self._totals[stage] = StageTotal(total.passages + 1, total.wall_seconds + wall, total.cpu_seconds + cpu)
 
 
 @dataclass(slots=True)

@@ -182,7 +182,7 @@ def metrics_of(run: Measured, alone: Measured | None, suffix: str = "") -> dict[
         metrics["share_of_in_process"] = Metric.of(ratios, "x in process", 1.0)
     metrics["updates_per_second"] = Metric.of([w.updates / w.seconds for w in windows], "1/s")
     for stage in (*ACTOR_STAGES, "other"):
-        limit = 1e3 * alone.median(lambda w, s=stage: _wall(w, s)) if alone is not None else None
+        limit = 1e3 * alone.median(partial(_wall, stage=stage)) if alone is not None else None
         samples = [1e3 * _wall(window, stage) for window in windows]
         metrics[f"actor_{stage}_ms"] = Metric.of(samples, "ms/update", limit or None)
     for stage in LEARNER_STAGES:

@@ -2,6 +2,7 @@
 
 import time
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -11,6 +12,7 @@ from hoz_dist.cli.options import echo_json, force_option, json_option
 from hoz_dist.errors import InvalidValueError
 
 if TYPE_CHECKING:
+    from hoz_dist.cli.progress import Progress
     from hoz_dist.scaling.costs import Costs
 
 DEFAULT_ACTORS: Final = ("1,10,100,1000,10000",)
@@ -147,7 +149,7 @@ def simulate_command(
                     design.costs,
                     replace(design.setting, actors=number),
                     seed,
-                    lambda share, d=done, n=note: progress.update(d + share, n),
+                    partial(_tell, progress, done, note),
                 )
                 rows.append(Row(design.name, predicted, time.perf_counter() - began))
         progress.update(len(rows))
@@ -160,6 +162,10 @@ def simulate_command(
         echo_json({"costs": {"preset": measured.preset, "machine": measured.machine}, "predictions": results})
     else:
         print_table(rows)
+
+
+def _tell(progress: "Progress", done: int, note: str, share: float) -> None:
+    progress.update(done + share, note)
 
 
 def _described(costs: "Costs") -> str:

@@ -38,11 +38,11 @@ class Client:
             yield self._host.use(wire)
             reply = node.send(push, costs.bytes_up)
             yield reply | env.timeout(patience)
-            if not reply.triggered:
+            answer: Answer | None = reply.value if reply.triggered else None
+            if answer is None:
                 node.counted.resent += push.count
                 patience = min(2.0 * patience, LONGER_TRIES * FIRST_TRY_S)
-            elif reply.value.kind != "busy":
-                answer: Answer = reply.value
+            elif answer.kind != "busy":
                 return answer
             yield from self._pause(pause)
             pause = min(2.0 * pause, LONGEST_PAUSE_S)

@@ -116,8 +116,12 @@ class Costs:
             InvalidValueError: The costs are of rollouts, from which those of gradients cannot be told.
             UnknownNameError: There is no such choice.
         """
-        choices = {"learn_from": learn_from, "compress": compress, "parameters_form": parameters_form}
-        new = replace(self, **{name: choice for name, choice in choices.items() if choice is not None})
+        new = replace(
+            self,
+            learn_from=learn_from or self.learn_from,
+            compress=compress or self.compress,
+            parameters_form=parameters_form or self.parameters_form,
+        )
         share = (new.bytes_up + new.bytes_down) / (self.bytes_up + self.bytes_down)
         new = replace(new, actor_wire=share * self.actor_wire, learner_wire=share * self.learner_wire)
         if new.learn_from == self.learn_from:

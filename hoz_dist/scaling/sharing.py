@@ -110,4 +110,8 @@ def call(env: simpy.Environment, delay: float, function: Callable[..., object], 
     """Call a function after a while."""
     event = env.timeout(delay)
     assert event.callbacks is not None  # noqa: S101 - only an event that has happened has none
-    event.callbacks.append(lambda _: function(*arguments))
+
+    def happened(_: simpy.Event) -> None:
+        function(*arguments)
+
+    event.callbacks.append(happened)

@@ -17,7 +17,7 @@ def test_time_counts_for_the_innermost_stage() -> None:
     totals = clock.totals()
     assert totals["inner"].wall_seconds >= PAUSE_S
     assert totals["outer"].wall_seconds < PAUSE_S
-    assert (totals["outer"].count, totals["inner"].count) == (1, 1)
+    assert (totals["outer"].passages, totals["inner"].passages) == (1, 1)
 
 
 def test_waiting_takes_no_processor_time() -> None:
@@ -45,7 +45,7 @@ def test_stages_add_up_over_passages_and_threads() -> None:
         thread.start()
     for thread in threads:
         thread.join()
-    assert clock.totals()["stage"].count == 400
+    assert clock.totals()["stage"].passages == 400
 
 
 def test_a_thread_is_in_its_own_stages_only() -> None:
@@ -75,7 +75,7 @@ def test_a_stage_that_fails_counts_and_ends() -> None:
             raise KeyError
     with clock("after"):
         pass
-    assert clock.totals()["fails"].count == 2
+    assert clock.totals()["fails"].passages == 2
     assert set(clock.totals()) == {"fails", "after"}
 
 
