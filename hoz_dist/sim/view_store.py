@@ -30,7 +30,7 @@ from hoz_dist.nav.encoder import VisualEncoder
 from hoz_dist.nav.pose import PICTURE_SIZE, VIEWS_PER_POSITION
 from hoz_dist.nav.rooms import RoomId
 from hoz_dist.sim.appearance import appearance
-from hoz_dist.sim.catalogue import load_room
+from hoz_dist.sim.catalogue import load_room, recorded_digest
 from hoz_dist.sim.detections import Detector
 from hoz_dist.sim.painter import Painter
 from hoz_dist.sim.pose_graph import PoseGraph
@@ -71,16 +71,18 @@ class ViewStore:
         self,
         folder: Path | None = None,
         picture_size: int = PICTURE_SIZE,
-        rooms: Callable[[RoomId], Room] = load_room,
+        rooms: Callable[[RoomId], Room] | None = None,
     ) -> None:
         """Use a cache folder, which is made when something is first stored in it.
 
         Args:
             folder: The cache folder; `default_cache` if None.
             picture_size: S, side of the square pictures in pixels.
-            rooms: Gives the content of a room; the catalogue by default.
+            rooms: Gives the content of a room; the catalogue if None.
         """
-        self._load_room = cache(rooms)
+        self._load_room = cache(rooms or load_room)
+        # Making a room takes ten times as long as opening its views; what is in the cache needs its digest alone.
+        self._digest_of = recorded_digest if rooms is None else lambda room: self._load_room(room).digest
         self._opened: dict[RoomId, ViewFolder] = {}
         self._cache = default_cache() if folder is None else folder
         self._size = picture_size
@@ -97,10 +99,10 @@ class ViewStore:
         Raises:
             InvalidValueError: Something is missing and the cache cannot be written.
         """
-        content = self._load_room(room)
-        path, name = self._path(content), _derived_name(encoder)
+        path, name = self._path(room), _derived_name(encoder)
         opened = self._opened_derived(path, name)
         if opened is None:
+            content = self._load_room(room)
             with self._writing(path, progress), Painter(content, self._size) as painter:
                 folder = self._open_or_create(path, painter)
                 # Another process may have been through this while we waited for the lock.
@@ -111,13 +113,12 @@ class ViewStore:
             if arrays is None:
                 raise _unwritable(self._cache, "what was written could not be read back")
             opened = folder, arrays
-        return _room_views(content, *opened)
+        return _room_views(room, self._digest_of(room), *opened)
 
     def find(self, room: RoomId, encoder: VisualEncoder) -> RoomViews | None:
         """Return a room's views as an encoder sees them if the cache has them all; otherwise None, without delay."""
-        content = self._load_room(room)
-        opened = self._opened_derived(self._path(content), _derived_name(encoder))
-        return None if opened is None else _room_views(content, *opened)
+        opened = self._opened_derived(self._path(room), _derived_name(encoder))
+        return None if opened is None else _room_views(room, self._digest_of(room), *opened)
 
     def holds(self, room: RoomId, encoder: VisualEncoder) -> bool:
         """Tell whether `open` would find all of a room in the cache."""
@@ -160,12 +161,11 @@ class ViewStore:
     def _folder(self, room: RoomId) -> ViewFolder:
         """Return a room's folder, opened or made at the first call."""
         if room not in self._opened:
-            content = self._load_room(room)
-            path = self._path(content)
+            path = self._path(room)
             try:
                 self._opened[room] = ViewFolder.open(path, self._size)
             except DamagedFileError:
-                with self._writing(path), Painter(content, self._size) as painter:
+                with self._writing(path), Painter(self._load_room(room), self._size) as painter:
                     self._opened[room] = self._open_or_create(path, painter)
         return self._opened[room]
 
@@ -185,10 +185,11 @@ class ViewStore:
         except DamagedFileError:
             return ViewFolder.create(path, painter.pose_graph(), self._size)
 
-    def _path(self, room: Room) -> Path:
+    def _path(self, room: RoomId) -> Path:
         """Return the folder for a room's pictures: its name holds the digest of all that shapes them."""
-        parts = (FORMAT_VERSION, room.digest, self._size, version("pybullet"), _sources_digest(_PICTURE_SOURCES))
-        return self._cache / f"{room.room.scene}-{room.room.number}-{_short_digest(*parts)}"
+        pybullet = version("pybullet")
+        parts = (FORMAT_VERSION, self._digest_of(room), self._size, pybullet, _sources_digest(_PICTURE_SOURCES))
+        return self._cache / f"{room.scene}-{room.number}-{_short_digest(*parts)}"
 
     @contextmanager
     def _writing(self, path: Path, progress: Progress | None = None) -> Iterator[None]:
@@ -205,11 +206,11 @@ class ViewStore:
             raise _unwritable(self._cache, error.strerror or str(error)) from error
 
 
-def _room_views(room: Room, folder: ViewFolder, arrays: dict[str, NDArray[Any]]) -> RoomViews:
+def _room_views(room: RoomId, digest: str, folder: ViewFolder, arrays: dict[str, NDArray[Any]]) -> RoomViews:
     # A room may hold objects that are targets of other scenes only, such as a chair in a bathroom.
-    asked_for = {category_index(category) for category in SCENE_TARGETS[room.room.scene]}
+    asked_for = {category_index(category) for category in SCENE_TARGETS[room.scene]}
     targets = tuple(target for target in sorted(asked_for) if arrays["success"][:, target].any())
-    return RoomViews(room=room.room, digest=room.digest, graph=folder.graph, targets=targets, **arrays)
+    return RoomViews(room=room, digest=digest, graph=folder.graph, targets=targets, **arrays)
 
 
 def _acquired(lock: filelock.BaseFileLock, progress: Progress | None) -> AbstractContextManager[object]:

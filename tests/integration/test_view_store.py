@@ -6,6 +6,7 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import NoReturn
 
 import numpy as np
 import pytest
@@ -14,10 +15,14 @@ from hoz_dist.errors import HozError
 from hoz_dist.nav.categories import category_index
 from hoz_dist.nav.pose import Pose
 from hoz_dist.nav.rooms import RoomId
+from hoz_dist.policy.encoders.pooled import PooledEncoder
+from hoz_dist.sim import view_store
 from hoz_dist.sim.camera import Camera
+from hoz_dist.sim.catalogue import load_room
 from hoz_dist.sim.room_views import RoomViews
-from hoz_dist.sim.view_store import default_cache
+from hoz_dist.sim.view_store import ViewStore, default_cache
 from hoz_dist.sim.world import World
+from tests.integration.commands import SMALL_ROOMS
 from tests.integration.seeing import KITCHEN, SIDE, TinyEncoder, small_rooms, small_store
 
 pytestmark = pytest.mark.integration
@@ -234,3 +239,16 @@ def test_the_default_cache(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> N
     assert default_cache() == tmp_path
     monkeypatch.delenv("HOZ_CACHE")
     assert default_cache().name == "hoz-dist"
+
+
+def test_a_room_of_the_cache_opens_without_being_made_again(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    room, encoder = RoomId.parse(SMALL_ROOMS[0]), PooledEncoder()
+    made = ViewStore(cache, 16).open(room, encoder)
+
+    def fail(asked: RoomId) -> NoReturn:
+        raise AssertionError(asked)
+
+    monkeypatch.setattr(view_store, "load_room", fail)
+    opened = ViewStore(cache, 16).open(room, encoder)
+    assert opened.digest == load_room(room).digest
+    assert np.array_equal(opened.features, made.features)

@@ -31,7 +31,7 @@ def test_who_waits_for_another_process_can_be_stopped(tmp_path: Path) -> None:
         if len(told) == 2:
             raise StopError
 
-    with (tmp_path / f".{store._path(small_rooms(KITCHEN)).name}.lock").open("w") as other:
+    with (tmp_path / f".{store._path(KITCHEN).name}.lock").open("w") as other:
         fcntl.flock(other, fcntl.LOCK_EX)
         with pytest.raises(StopError):
             store.open(KITCHEN, TinyEncoder(), stop_at_the_second_call)
