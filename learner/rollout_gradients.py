@@ -126,7 +126,7 @@ class RolloutGradients:
         steps, rooms = push.steps, [self._rooms[used.room] for used in push.rooms]
         self._check(push, rooms)
         bank = self._bank(push.graphs)
-        views = np.array([room.start for room in rooms])[steps.room] + steps.view
+        views = np.array([room.start for room in rooms], np.int64)[steps.room] + steps.view.astype(np.int64)
         self._check_moves(steps, views)
         before = self._states.before(push.actor, push.incarnation, push.sequence)
         batch = steps.action.shape[1]
@@ -193,8 +193,9 @@ class RolloutGradients:
         """
         graphs = []
         for one in used:
-            graph = self._graphs.get(one.scene, {}).get(one.version) if one.epoch == self._epoch else None
-            if graph is None:
+            versions = self._graphs.get(one.scene, OrderedDict())
+            graph = versions.get(one.version)
+            if graph is None or one.epoch != self._epoch:
                 detail = f"graph {one.version} of {one.scene}, of epoch {one.epoch}, is not known"
                 raise RejectedError(Reason.STALE, detail)
             graphs.append(graph)

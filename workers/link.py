@@ -103,7 +103,7 @@ class LearnerLink(Closing):
         self._sequences: Counter[type[Push]] = Counter()
         self._compressor: Compressor | None = None
         """Made for the first gradient, which says how many entries they have."""
-        self._new_pusher = lambda: Pusher(
+        self._new_pusher: Callable[[], Pusher] = lambda: Pusher(
             session,
             stop,
             epochs=self._epochs,

@@ -1,7 +1,7 @@
 """From what an actor did and saw to the message that a learner sees it all from."""
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,7 +47,7 @@ def steps_of(acted: Sequence[Acted], after: Seen, rooms: Sequence[RoomViews]) ->
     seen = [*(Seen(*moment[:3]) for moment in acted), after]
     used, room = np.unique(np.stack([moment.places.room for moment in seen]), return_inverse=True)
 
-    def rows(part: Callable[[Seen], NDArray[np.generic] | Tensor], dtype: type[np.generic]) -> NDArray[np.generic]:
+    def rows(part: Callable[[Seen], NDArray[Any] | Tensor], dtype: type[np.generic]) -> NDArray[Any]:
         return np.stack([np.asarray(part(moment)) for moment in seen]).astype(dtype)
 
     steps = Steps(

@@ -94,8 +94,8 @@ class Differentiator:
             The loss, and the state of these parameters after the last step.
         """
         steps = len(behaviour.actions)
-        seen, after = (Observation(*(part[rows] for part in observation)) for rows in _split(steps))
-        guided, guided_after = (Guidance(*(part[rows] for part in guidance)) for rows in _split(steps))
+        seen, after = (Observation._make(part[rows] for part in observation) for rows in _split(steps))
+        guided, guided_after = (Guidance._make(part[rows] for part in guidance) for rows in _split(steps))
         self._tape.rewind()
         unrolled = self._policy.unroll(seen, start, guided, bank, self._tape)
         with torch.no_grad():

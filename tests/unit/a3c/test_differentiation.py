@@ -51,8 +51,8 @@ class Acted:
         )
 
     def on_policy(self, rollout: Rollout) -> torch.Tensor:
-        observation = Observation(*(part[:STEPS] for part in self.observation))
-        guidance = Guidance(*(part[:STEPS] for part in self.guidance))
+        observation = Observation._make(part[:STEPS] for part in self.observation)
+        guidance = Guidance._make(part[:STEPS] for part in self.guidance)
         self.differentiator.on_policy(rollout, observation, guidance, self.start, self.bank)
         return self.parameters.gradients.clone()
 

@@ -26,7 +26,7 @@ def slow_vtrace(
 
     def delta(t: int, b: int) -> float:
         following = 0.0 if rollout.terminated[t, b] else discount * values[t + 1, b]
-        return float(rollout.rewards[t, b]) + following - values[t, b]
+        return float(rollout.rewards[t, b] + following - values[t, b])
 
     for b in range(batch):
         for s in range(steps - 1, -1, -1):

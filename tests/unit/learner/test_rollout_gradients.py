@@ -77,7 +77,7 @@ def test_what_the_actor_saw_is_seen_again(monkeypatch: pytest.MonkeyPatch) -> No
         expected = Observation(*map(np.stack, zip(*seen, strict=True)))
         for name, mine, theirs in zip(Observation._fields, again[-1], expected, strict=True):
             np.testing.assert_array_equal(mine, theirs, err_msg=name)
-        del actor._env.observe  # type: ignore[method-assign]
+        del actor._env.observe
     assert set(np.unique(again[-1].scene)) == {0, 2}
 
 

@@ -1,5 +1,6 @@
 """Rollouts by pose ids: small, and of steps that can follow each other."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -78,7 +79,7 @@ def test_steps_that_cannot_follow_each_other_are_refused() -> None:
     done[3, 0] = 5
     other = moves.target.copy()
     other[3:, 0] = 2
-    cases = {
+    cases: dict[str, Callable[[], Steps]] = {
         "the row after": lambda: replace(moves, flags=flags_with(moves, 6, Flag.VALID)),
         "terminated by Done alone": lambda: replace(moves, flags=flags_with(moves, 3, Flag.TERMINATED)),
         "Done alone": lambda: replace(moves, action=np.full_like(moves.action, 5)),
