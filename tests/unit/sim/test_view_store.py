@@ -9,7 +9,7 @@ import pytest
 
 from hoz_dist.nav.encoder import VisualEncoder
 from hoz_dist.sim import view_store
-from tests.integration.seeing import KITCHEN, TinyEncoder, small_rooms, small_store
+from tests.integration.seeing import KITCHEN, TinyEncoder, small_store
 
 PACKAGE = Path(view_store.__file__).parents[1]
 SIM = PACKAGE / "sim"
