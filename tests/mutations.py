@@ -178,7 +178,7 @@ def bad_gradient(data: bytes, other: bytes, rng: random.Random) -> bytes:
     tensor = gradient[name]
     number = rng.choice((struct.pack("<f", float("nan")), b"\xff\xff\xff\xff", b"\x80\x7f\x80\x7f", b"\x80" * 4))
     place = 4 * rng.randrange(len(bulk) // 4)
-    spoilt = (
+    spoilt: tuple[dict[str, Any], ...] = (
         {"codec": rng.choice(("fp32", "bf16", "int8", "topk", "fp64", "", None))},
         {name: tensor | {"data": bytes(4)}},
         {name: tensor | {"dtype": rng.choice(("float32", "float64", "bfloat16", "int8", "uint32", "", None))}},

@@ -56,7 +56,7 @@ class Bf16:
     def take(self, vector: Tensor, largest: float) -> Bf16Gradient:
         """See `Codec.take`."""
         clip_norm(vector, largest / _BF16_ROUNDS_UP)
-        for values, halves in zip(vector.split(_PIECE), self._halves.split(_PIECE), strict=True):
+        for values, halves in zip(torch.split(vector, _PIECE), torch.split(self._halves, _PIECE), strict=True):
             halves.copy_(values)
             values.sub_(halves.float())
         return Bf16Gradient(_bits(self._halves))
@@ -81,7 +81,7 @@ class Int8:
         clip_norm(vector, largest)
         sent = self._padded.view(-1)[: self._size]
         sent.copy_(vector)
-        pieces = (tensor.split(_PIECE // INT8_BLOCK) for tensor in (self._padded, self._levels, self._scales))
+        pieces = (torch.split(tensor, _PIECE // INT8_BLOCK) for tensor in (self._padded, self._levels, self._scales))
         for values, levels, scales in zip(*pieces, strict=True):
             highest, lowest = values.amax(dim=1, keepdim=True), values.amin(dim=1, keepdim=True)
             torch.div(torch.maximum(highest, -lowest), _LEVELS, out=scales)

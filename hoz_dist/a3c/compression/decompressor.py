@@ -58,6 +58,6 @@ def _expand(levels: torch.Tensor, scales: torch.Tensor, vector: torch.Tensor) ->
     whole = levels.numel() // INT8_BLOCK
     end = whole * INT8_BLOCK
     rows = (levels[:end].view(whole, INT8_BLOCK), scales[:whole, None], vector[:end].view(whole, INT8_BLOCK))
-    for some_levels, some_scales, values in zip(*(row.split(_ROWS) for row in rows), strict=True):
+    for some_levels, some_scales, values in zip(*(torch.split(row, _ROWS) for row in rows), strict=True):
         values.copy_(some_levels).mul_(some_scales)
     torch.mul(levels[end:], scales[whole:], out=vector[end:])

@@ -194,7 +194,7 @@ class Tensor:
         """
         array = np.ascontiguousarray(value, DTYPES[self.dtype])
         data = array.reshape(-1).data.cast("B")
-        description = {"dtype": self.dtype, "shape": list(array.shape)}
+        description: dict[str, object] = {"dtype": self.dtype, "shape": list(array.shape)}
         return Bulky(description, data) if self.bulk else description | {"data": data}
 
     def unpack(self, raw: object, where: str) -> object:

@@ -25,7 +25,7 @@ def sums(compression: Compression, gradients: list[Vector], largest: float = NO_
     for gradient in gradients:
         sent += decompressor.vector(compressor.compress(gradient))
         compressor.accepted()
-    return sent.astype(np.float32), np.sum(gradients, axis=0, dtype=np.float64).astype(np.float32)
+    return sent.astype(np.float32), np.stack(gradients).sum(axis=0, dtype=np.float64).astype(np.float32)
 
 
 @pytest.mark.parametrize(("compression", "error"), [("bf16", 0.004), ("int8", 0.04), ("topk", 12.0)])
