@@ -89,6 +89,7 @@ def train_command(
 
     from hoz_dist.atomic import check_writable, write_atomically
     from hoz_dist.bench.training import bottleneck, measure_in_turns, metrics_of
+    from hoz_dist.cli.launch import sharing
     from hoz_dist.cli.progress import Progress
     from hoz_dist.cli.rendering import Encoding, render_rooms
     from hoz_dist.nav.rooms import training_rooms
@@ -104,9 +105,10 @@ def train_command(
     with ExitStack() as stack:
         logs = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="hoz-dist-")))
         files = {"weights": choices["weights"], "cache": folder}
-        words = as_arguments({"scene": scenes, **files})
+        shared = sharing(config.preset)
+        words = as_arguments({"scene": scenes, **files}) + shared
         runs: dict[str, Trainers] = {
-            _name(count): stack.enter_context(_Run(logs / _name(count), count, as_arguments(choices), words))
+            _name(count): stack.enter_context(_Run(logs / _name(count), count, as_arguments(choices) + shared, words))
             for count in counts
         }
         loops = partial(_in_process, config, rooms, folder, choices["weights"], logs)

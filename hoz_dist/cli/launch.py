@@ -13,11 +13,26 @@ from hoz_dist.cli.processes import ACTOR_NICENESS, Child, Children
 from hoz_dist.cli.progress import Progress
 from hoz_dist.client import HozClient
 from hoz_dist.errors import ConnectionFailedError, HozError
+from hoz_dist.policy.settings import Preset
 from hoz_dist.waiting import Deadline
 
 START_S: Final = 60.0
 """How long the learner may take to answer for the first time, seconds."""
 POLL_S: Final = 1.0
+
+
+def sharing(preset: Preset, *, wanted: bool | None = None) -> list[str]:
+    """Return the further options of a learner and actors that share a machine.
+
+    They hand over messages of tens of megabytes through shared memory, which takes a third of the time. Those of a
+    small network gain little, and Zenoh keeps the memory of killed actors; see docs/decisions/shared-memory.md.
+
+    Args:
+        preset: Size of the network.
+        wanted: What the user says; None for nothing.
+    """
+    share = preset == "paper" if wanted is None else wanted
+    return ["--shared-memory"] if share else []
 
 
 def launch(run: Path, endpoint: str, learner: Sequence[str], actor: Sequence[str], actors: int) -> None:

@@ -40,6 +40,11 @@ from hoz_dist.nav.categories import SCENES
     show_default=True,
     help="Validation episodes in each scene afterwards; 0 for no evaluation.",
 )
+@click.option(
+    "--shared-memory/--no-shared-memory",
+    default=None,
+    help="Hand over large messages through shared memory.  [default: with --preset paper]",
+)
 @keep_every_option
 @cache_option
 def train_command(
@@ -51,6 +56,8 @@ def train_command(
     episodes: int,
     keep_every: int | None,
     cache: Path | None,
+    *,
+    shared_memory: bool | None,
     **choices: Any,
 ) -> None:
     """Train on this machine, then measure the agent on unseen validation rooms and draw pictures.
@@ -58,17 +65,17 @@ def train_command(
     Starts one learner and some actors, which find each other over Zenoh on a loopback port. Ctrl-C stops them cleanly;
     the same command then goes on where the run was.
     """
-    from hoz_dist.cli.launch import launch
+    from hoz_dist.cli.launch import launch, sharing
     from hoz_dist.nav.rooms import training_rooms
 
     # What is wrong with the options is said before anything starts.
     training_rooms(scenes or SCENES)
     choices |= {"minutes": 10.0 if minutes is None and frames is None else minutes, "frames": frames}
-    run_config(choices)
+    config = run_config(choices)
     files = {"weights": choices["weights"], "cache": cache}
-    actor = as_arguments({"scene": scenes or SCENES, **files})
-
-    learner = as_arguments(choices | {"keep_every": keep_every, "cache": cache})
+    shared = sharing(config.preset, wanted=shared_memory)
+    actor = as_arguments({"scene": scenes or SCENES, **files}) + shared
+    learner = as_arguments(choices | {"keep_every": keep_every, "cache": cache}) + shared
 
     launch(run, free_endpoint(), learner, actor, actors)
 
