@@ -1,7 +1,6 @@
 """`hoz-dist bench env`: steps of stored environments, and the opening of rooms."""
 
 import statistics
-import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
@@ -11,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from hoz_dist.bench.report import Metric
-from hoz_dist.bench.timing import Contender, Progress, rate, run_contests
+from hoz_dist.bench.timing import Contender, Progress, core_seconds, rate, run_contests
 from hoz_dist.nav.actions import Action
 from hoz_dist.nav.encoder import VisualEncoder
 from hoz_dist.nav.rooms import RoomId
@@ -38,7 +37,7 @@ def bench_env(
     repeats: int,
     progress: Progress,
 ) -> dict[str, Metric]:
-    """Measure steps per second in one thread, and how long a room takes to open.
+    """Measure steps per second of a core, and how long a room takes to open.
 
     A step includes what the agent perceives: features, boxes and appearance of all categories, and the bag, copied
     out. The limit is a plain copy of as many bytes out of a table of the same size. The limit of opening is reading
@@ -105,8 +104,8 @@ def _stepping(rooms: Sequence[RoomViews], batch: int, seconds: float) -> Iterato
             copied[:] = table[start : start + batch]
 
     yield {
-        f"steps, batch {batch}": lambda: rate(step, seconds) * _STEPS * batch,
-        f"copies, batch {batch}": lambda: rate(copy, seconds) * _STEPS * batch,
+        f"steps, batch {batch}": lambda: rate(step, seconds, core_seconds) * _STEPS * batch,
+        f"copies, batch {batch}": lambda: rate(copy, seconds, core_seconds) * _STEPS * batch,
     }
 
 
@@ -131,6 +130,6 @@ def _files(views: RoomViews) -> list[Path]:
 
 
 def _milliseconds(work: Callable[[], object]) -> float:
-    start = time.perf_counter()
+    start = core_seconds()
     work()
-    return 1000 * (time.perf_counter() - start)
+    return 1000 * (core_seconds() - start)

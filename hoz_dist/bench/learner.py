@@ -12,7 +12,7 @@ import torch
 from hoz_dist.a3c.compression.compressor import Compressor
 from hoz_dist.bench.report import Metric
 from hoz_dist.bench.samples import gradient
-from hoz_dist.bench.timing import Contender, Progress, rate, run_contests, seconds_per_call
+from hoz_dist.bench.timing import Contender, Progress, core_seconds, rate, run_contests, seconds_per_call
 from hoz_dist.config import Compression, RunConfig
 from hoz_dist.policy.parameters import initial_parameters
 from hoz_dist.policy.settings import Preset
@@ -39,7 +39,7 @@ def bench_learner(
     repeats: int,
     progress: Progress,
 ) -> dict[str, Metric]:
-    """Measure how long a gradient takes in one thread: checksum, decoding, checks, and the update.
+    """Measure how long a gradient takes of a core: checksum, decoding, checks, and the update.
 
     The limit is fused Adam alone on as many parameters. The ratio of the two is taken of measurements that follow each
     other, and its limit is 1.
@@ -88,6 +88,6 @@ def _applying(preset: Preset, codec: Compression, seconds: float) -> Iterator[Ma
     adam = torch.optim.Adam([tensor], lr=config.learning_rate, betas=BETAS, eps=EPSILON, fused=True)
     name = f"learner_{preset}_{codec}"
     yield {
-        name: lambda: 1000 * seconds_per_call(receive, apply, seconds),
-        f"{name}, Adam alone": lambda: 1000 / rate(adam.step, seconds),
+        name: lambda: 1000 * seconds_per_call(receive, apply, seconds, core_seconds),
+        f"{name}, Adam alone": lambda: 1000 / rate(adam.step, seconds, core_seconds),
     }

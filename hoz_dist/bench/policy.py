@@ -13,7 +13,7 @@ from hoz_dist.a3c.rollout import Rollout
 from hoz_dist.bench.products import Product, acting_products, run_products, training_products
 from hoz_dist.bench.report import Metric
 from hoz_dist.bench.samples import graph_bank, observations
-from hoz_dist.bench.timing import Contender, Contest, Progress, Samples, rate, run_contests
+from hoz_dist.bench.timing import Contender, Contest, Progress, Samples, core_seconds, rate, run_contests
 from hoz_dist.config import PRESET_PRECISIONS, RunConfig
 from hoz_dist.nav.actions import Action
 from hoz_dist.nav.observation import Observation
@@ -30,7 +30,7 @@ _UNIT: Final = "frames/s"
 def bench_policy(
     presets: Sequence[Preset], *, steps: int, seconds: float, repeats: int, progress: Progress
 ) -> dict[str, Metric]:
-    """Measure frames per second of method `hoz` in one thread; the limit is the matrix products alone.
+    """Measure frames per second of a core with method `hoz`; the limit is the matrix products alone.
 
     Acting is T steps of B episodes. Training is the gradient of the loss of a rollout of T steps of B episodes: with
     the forward pass; and without that of the LSTM, from what acting recorded of it, as actors do. The products are
@@ -119,7 +119,7 @@ def _contenders(
 
 
 def _frames_per_second(run: Callable[[], None], frames: int, seconds: float) -> float:
-    return rate(run, seconds) * frames
+    return rate(run, seconds, core_seconds) * frames
 
 
 def _rollout(values: torch.Tensor) -> Rollout:

@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from hoz_dist.bench.report import Metric
-from hoz_dist.bench.timing import Contender, Progress, rate, run_contests
+from hoz_dist.bench.timing import Contender, Progress, core_seconds, rate, run_contests
 from hoz_dist.nav.pose import CAMERA_HEIGHT_M, FIELD_OF_VIEW_DEG, Pose
 from hoz_dist.nav.rooms import RoomId
 from hoz_dist.sim.bullet import pybullet
@@ -27,7 +27,7 @@ _FAR_M: Final = 20.0
 def bench_render(
     name: RoomId, sizes: Sequence[int], *, seconds: float, repeats: int, progress: Progress
 ) -> dict[str, Metric]:
-    """Measure views per second in one thread: drawn, turned into arrays of metres and item numbers, and checked.
+    """Measure views per second of a core: drawn, turned into arrays of metres and item numbers, and checked.
 
     The limit is PyBullet drawing the same views of the same room, with nothing done to what it returns.
 
@@ -76,8 +76,8 @@ def _drawing(
                 )
 
         yield {
-            f"views of {size} pixels": lambda: rate(paint, seconds) * len(views),
-            f"bare calls, {size} pixels": lambda: rate(draw, seconds) * len(views),
+            f"views of {size} pixels": lambda: rate(paint, seconds, core_seconds) * len(views),
+            f"bare calls, {size} pixels": lambda: rate(draw, seconds, core_seconds) * len(views),
         }
 
 

@@ -15,6 +15,10 @@ Samples = Mapping[str, Sequence[float]]
 """The figures of each contender, by its name."""
 Progress = Callable[[float, float, str], None]
 """Called with how many contests are done, how many there are, and what is measured now."""
+Clock = Callable[[], float]
+"""Tells a time in seconds."""
+core_seconds: Final[Clock] = time.process_time
+"""The time in which this process really ran on a core: it stands still while another process has the core."""
 T = TypeVar("T")
 
 
@@ -53,35 +57,39 @@ def _turns(
                 own[name].append(figure)
 
 
-def rate(work: Callable[[], object], seconds: float) -> float:
+def rate(work: Callable[[], object], seconds: float, clock: Clock = time.perf_counter) -> float:
     """Return how often per second some work can be done.
 
     Args:
         work: The work.
         seconds: It is repeated for so long, and done at least once.
+        clock: Seconds of what; `core_seconds` for work that waits for nobody.
     """
-    count, start = 0, time.perf_counter()
+    count, start = 0, clock()
     while True:
         work()
         count += 1
-        elapsed = time.perf_counter() - start
+        elapsed = clock() - start
         if elapsed >= seconds:
             return count / elapsed
 
 
-def seconds_per_call(prepare: Callable[[], T], work: Callable[[T], object], seconds: float) -> float:
+def seconds_per_call(
+    prepare: Callable[[], T], work: Callable[[T], object], seconds: float, clock: Clock = time.perf_counter
+) -> float:
     """Return how long some work takes, without what has to be prepared for it each time.
 
     Args:
         prepare: Makes what the work needs.
         work: The work.
         seconds: It is repeated until it has taken so long, and done at least once.
+        clock: Seconds of what; see `rate`.
     """
     count, elapsed = 0, 0.0
     while not count or elapsed < seconds:
         material = prepare()
-        start = time.perf_counter()
+        start = clock()
         work(material)
-        elapsed += time.perf_counter() - start
+        elapsed += clock() - start
         count += 1
     return elapsed / count

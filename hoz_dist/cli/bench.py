@@ -65,7 +65,7 @@ def env_command(
 ) -> None:
     """Measure steps per second of stored environments, and how long a room takes to open.
 
-    One thread. A step includes picture features, boxes, appearance and bags, copied out. Limits: a plain copy of as
+    Of one core. A step includes picture features, boxes, appearance and bags, copied out. Limits: a plain copy of as
     many bytes, and reading a room's files.
     """
     # The rooms are named before the imports that take time: these say what is wrong with the names.
@@ -95,7 +95,7 @@ def env_command(
 def render_command(sizes: tuple[int, ...], room: str, seconds: float, repeats: int, *, as_json: bool) -> None:
     """Measure how many views a second are drawn into arrays, beside bare calls of PyBullet's renderer.
 
-    One thread, no GPU. The views lie all over the room; both sides draw the same ones.
+    Of one core, without a GPU. The views lie all over the room; both sides draw the same ones.
     """
     name = RoomId.parse(room)
 
@@ -111,7 +111,7 @@ def render_command(sizes: tuple[int, ...], room: str, seconds: float, repeats: i
 def policy_command(presets: "tuple[Preset, ...]", steps: int, seconds: float, repeats: int, *, as_json: bool) -> None:
     """Measure how many frames a second the policy acts in, and learns from.
 
-    One thread, model hoz. Acting in 1 and 64 episodes; the gradient of a rollout of 16 and 64 episodes, with the
+    Of one core, model hoz. Acting in 1 and 64 episodes; the gradient of a rollout of 16 and 64 episodes, with the
     forward pass and from what acting recorded of it. The limit: the matrix products alone.
     """
     from hoz_dist.bench.policy import bench_policy
@@ -128,7 +128,7 @@ def learner_command(
 ) -> None:
     """Measure how long the learner takes from a gradient's bytes to changed parameters.
 
-    One thread; checksum, decoding and all checks are included. The limit: fused Adam alone on as many parameters.
+    Of one core; checksum, decoding and all checks are included. The limit: fused Adam alone on as many parameters.
     """
     from hoz_dist.bench.learner import bench_learner
 
