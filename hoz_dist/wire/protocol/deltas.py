@@ -33,7 +33,8 @@ def quantise(vector: NDArray[np.float32], base: NDArray[np.float32]) -> Quantise
     """Return the difference of two vectors [P]; of entries that are not finite a scale that is not."""
     size = vector.size
     result = Quantised(np.empty(-(-size // BLOCK), np.float32), np.empty(size, np.int8))
-    scratch = np.empty(_AT_ONCE, np.float32)
+    scratch, magnitudes = np.empty(_AT_ONCE, np.float32), np.empty(_AT_ONCE, np.float32)
+    starts = np.arange(0, _AT_ONCE, BLOCK)
     with np.errstate(invalid="ignore", over="ignore"):
         for start in range(0, size, _AT_ONCE):
             stop = min(start + _AT_ONCE, size)
@@ -41,8 +42,10 @@ def quantise(vector: NDArray[np.float32], base: NDArray[np.float32]) -> Quantise
             scratch[length : blocks * BLOCK] = 0.0
             difference = scratch[:length]
             np.subtract(vector[start:stop], base[start:stop], out=difference)
+            np.abs(difference, out=magnitudes[:length])
+            largest = np.maximum.reduceat(magnitudes[:length], starts[:blocks])
             scales = result.scales[start // BLOCK : start // BLOCK + blocks]
-            _quantise_blocks(scratch[: blocks * BLOCK].reshape(blocks, BLOCK), scales)
+            _quantise_blocks(scratch[: blocks * BLOCK].reshape(blocks, BLOCK), largest, scales)
             result.values[start:stop] = difference
     return result
 
@@ -67,9 +70,14 @@ def add(base: NDArray[np.float32], delta: Quantised, out: NDArray[np.float32]) -
         part += base[start:stop]
 
 
-def _quantise_blocks(blocks: NDArray[np.float32], scales: NDArray[np.float32]) -> None:
-    """Turn differences [M, BLOCK] into whole multiples of the scales [M], which are written too."""
-    largest = np.maximum(blocks.max(axis=1), -blocks.min(axis=1))
+def _quantise_blocks(blocks: NDArray[np.float32], largest: NDArray[np.float32], scales: NDArray[np.float32]) -> None:
+    """Turn differences [M, BLOCK] into whole multiples of scales [M], which are written too.
+
+    Args:
+        blocks: Differences; become multiples.
+        largest: Largest absolute value of each block, [M].
+        scales: Where the scales go.
+    """
     changed = ~(largest < _LEAST)  # and what is no number
     np.divide(largest, _STEPS, out=scales)
     scales[~changed] = 0.0

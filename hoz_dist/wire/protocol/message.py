@@ -20,8 +20,8 @@ MAX_PARAMETERS: Final = 30_000_000
 MAX_EPISODES: Final = 4096
 MAX_FRAMES: Final = 4096 * 1000
 """Largest number of frames of one gradient: those of the largest batch and rollout that a run may have."""
-SHARD_ELEMENTS: Final = 96 * 1024
-"""Elements of a full shard, 384 KiB: two fit into the sending queue of a slow client's link."""
+SHARD_ELEMENTS: Final = 120 * 1024
+"""Elements of a full shard, 480 KiB: two fit into the sending queue of a slow client's link."""
 
 
 SMALL_BYTES: Final = 64 * 1024

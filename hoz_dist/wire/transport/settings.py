@@ -17,7 +17,7 @@ _WAIT: Final = "transport/link/tx/queue/congestion_control/block/wait_before_clo
 _ROUTER_WAIT_US: Final = 1_500_000
 """Less than the lease. While a router waits for one client it does not hear the one whose message it forwards: with a
 wait of 10 s, a client that stood still with 16 MB on the way held up all others for 6.5 s, and the learner was given up
-as silent; with 1.5 s, for 1.5 s, and nobody was. A client at 0.6 Mbit/s still gets shards of 384 KiB."""
+as silent; with 1.5 s, for 1.5 s, and nobody was. A client at 0.6 Mbit/s still gets shards of 480 KiB."""
 _CLIENT_WAIT_US: Final = 5_000_000
 """A client waits in its own thread alone, and a slow link may take nothing for seconds. Not longer: a client with 40 MB
 on the way to a router that stood still for 6 s was back at once with 5 s, and after 10 s with 10 s."""
@@ -28,9 +28,9 @@ _COMMON: Final[dict[str, Any]] = {
     "scouting/delay": 0,  # nothing is scouted for; a router would wait half a second for it all the same
     # On where it is wanted; see `shared_memory_settings`.
     "transport/shared_memory/enabled": False,
-    # The priority of questions and answers. 16 batches of 64 KiB, Zenoh's limit, hold the two shards of 384 KiB that
-    # may be on their way to a client, and some smaller answers: a router that forwards them to a client that stands
-    # still must not wait for it, because everybody else would wait too.
+    # The priority of questions and answers. 16 batches of 64 KiB, Zenoh's limit, hold the two shards of 480 KiB that
+    # may be on their way to a client: a router that forwards them to a client that stands still must not wait for it,
+    # because everybody else would wait too.
     "transport/link/tx/queue/size/data": 16,
     "transport/link/rx/buffer_size": 4 * 1024 * 1024,
     "transport/link/rx/max_message_size": 128 * 1024 * 1024,

@@ -201,7 +201,7 @@ def test_what_another_host_is_sent_goes_as_bytes(endpoint: str, memory: SharedMe
 
 
 def test_gradients_and_parameters_pass_through_it(endpoint: str, memory: SharedMemory) -> None:
-    gradient, parameters = samples.gradient_push(0, size=300_000), np.arange(380_000, dtype=np.float32)
+    gradient, parameters = samples.gradient_push(0, size=300_000), np.arange(300_000, dtype=np.float32)
     snapshots = Snapshots(samples.config_reply(), samples.status_reply, "product")
     stop = threading.Event()
     with (

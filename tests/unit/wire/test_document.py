@@ -110,7 +110,7 @@ def test_the_parameters_of_the_examples_belong_together() -> None:
 
 
 def test_the_documented_limits_are_those_of_the_code() -> None:
-    assert f"shards of {SHARD_ELEMENTS:,} values (384 KiB)" in DOCUMENT
+    assert f"shards of {SHARD_ELEMENTS:,} values (480 KiB)" in DOCUMENT
     assert f"shards of {ParametersDelta.LENGTH:,} values" in DOCUMENT
     for part in (ParametersShard, ParametersDelta):
         assert f"| {part.LENGTH:,} of them in all shards but the last" in section(part.KIND)
