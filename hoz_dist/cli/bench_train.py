@@ -19,6 +19,7 @@ from hoz_dist.cli.ports import free_endpoint
 from hoz_dist.cli.processes import ACTOR_NICENESS, Child, Children
 from hoz_dist.cli.run_options import as_arguments, run_config, run_options
 from hoz_dist.errors import HozError, InvalidValueError
+from hoz_dist.nav.categories import SCENES
 
 if TYPE_CHECKING:
     from hoz_dist.client import HozClient
@@ -43,9 +44,17 @@ if TYPE_CHECKING:
     "--scene",
     "scenes",
     multiple=True,
-    default=("kitchen",),
+    default=SCENES,
+    show_default="all scenes",
+    help="Scene or training room to train in, kitchen or kitchen/3; may be repeated.",
+)
+@click.option(
+    "--rooms",
+    "most_rooms",
+    type=click.IntRange(1, 20),
+    default=1,
     show_default=True,
-    help="Scene or room to train in, kitchen or kitchen/3; may be repeated.",
+    help="Training rooms of each scene; more take longer to come into use.",
 )
 @click.option(
     "--seconds",
@@ -68,6 +77,7 @@ if TYPE_CHECKING:
 def train_command(
     actors: tuple[int, ...],
     scenes: tuple[str, ...],
+    most_rooms: int,
     seconds: float,
     repeats: int,
     costs: Path | None,
@@ -97,21 +107,20 @@ def train_command(
 
     if costs is not None:
         check_writable(costs, overwrite=force)
-    rooms = training_rooms(scenes)
+    rooms = [room for scene in scenes for room in training_rooms((scene,))[:most_rooms]]
     config = run_config(choices | {"minutes": None, "frames": None})
     folder = cache or default_cache()
     jobs, counts = len(os.sched_getaffinity(0)), tuple(dict.fromkeys(actors))
     render_rooms(rooms, folder, config.picture_size, jobs, Encoding(config.encoder, choices["weights"]))
     with ExitStack() as stack:
         logs = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="hoz-dist-")))
-        files = {"weights": choices["weights"], "cache": folder}
-        shared = sharing(config.preset)
-        words = as_arguments({"scene": scenes, **files}) + shared
+        shared, weights = sharing(config.preset), choices["weights"]
+        learner = as_arguments(choices | {"cache": folder}) + shared
+        actor = as_arguments({"scene": tuple(map(str, rooms)), "weights": weights, "cache": folder}) + shared
         runs: dict[str, Trainers] = {
-            _name(count): stack.enter_context(_Run(logs / _name(count), count, as_arguments(choices) + shared, words))
-            for count in counts
+            _name(count): stack.enter_context(_Run(logs / _name(count), count, learner, actor)) for count in counts
         }
-        loops = partial(_in_process, config, rooms, folder, choices["weights"], logs)
+        loops = partial(_in_process, config, rooms, folder, weights, logs)
         alone = {"in process": stack.enter_context(loops(counts[0]))}
         with Progress("Getting ready", 1.0, None) as progress:
             for number, (name, trainers) in enumerate((runs | alone).items()):
