@@ -57,6 +57,18 @@ def client(learner: Server, endpoint: str) -> Iterator[HozClient]:
 # --- the client ---
 
 
+def test_a_client_that_asks_again_gets_what_is_new_and_may_change_what_it_got(
+    learner: Server, client: HozClient
+) -> None:
+    expected = samples.scene_graph()
+    for _ in range(2):
+        graph = client.graph("kitchen")
+        np.testing.assert_array_equal(graph.nodes, expected.nodes)
+        graph.nodes[:] = 0.0
+    learner.put_graph(samples.scene_graph(version=3))
+    assert client.graph("kitchen").version == 3
+
+
 def test_a_client_gets_graphs_plans_status_and_configuration(client: HozClient) -> None:
     graph, expected = client.graph("kitchen"), samples.scene_graph()
     assert (graph.scene, graph.version, graph.rooms, graph.categories) == ("kitchen", 2, expected.rooms, TARGETS)

@@ -8,7 +8,7 @@ SIZE = 1000
 
 def place_of(array: np.ndarray) -> int:
     """Where its memory is."""
-    return array.__array_interface__["data"][0]
+    return int(array.__array_interface__["data"][0])
 
 
 def test_memory_is_used_again_when_nothing_refers_to_it() -> None:
