@@ -100,20 +100,19 @@ def await_version(endpoint: str, version: int, timeout_s: float, progress: Progr
         endpoint: Where it listens.
         version: The version.
         timeout_s: How long to wait.
-        progress: Told how far the learner is.
+        progress: Told how far the learner is; may raise to end the wait.
 
     Raises:
         ConnectionFailedError: It does not get so far in time.
     """
     deadline, backoff = Deadline(timeout_s), Backoff(threading.Event())
     while not deadline.passed:
+        now = -1
         with suppress(HozError), HozClient(endpoint) as client:
-            while not deadline.passed:
-                now = client.status()["version"]
-                progress(now, version, "updates")
-                if now >= version:
-                    return
-                backoff.pause(deadline)
+            now = client.status()["version"]
+        progress(max(now, 0), version, "updates")
+        if now >= version:
+            return
         backoff.pause(deadline)
     message = f"The learner at {endpoint} did not come to version {version} within {timeout_s:g} s."
     raise ConnectionFailedError(message)

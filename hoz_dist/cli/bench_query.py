@@ -90,17 +90,19 @@ def _learner(connect: str | None, actors: int, cache: Path | None) -> Iterator[s
     with tempfile.TemporaryDirectory(prefix="hoz-dist-") as logs, Children() as children:
         folder = Path(logs)
         children.start("learner", ["learner", "--listen", endpoint, "--run", str(folder / "bench")], folder / "learner")
-        options = ["--connect", endpoint, *as_arguments({"scene": _ROOM, "cache": cache})]
-        for number in range(actors):
-            name = f"actor-{number}"
-            children.start(name, ["actor", "--name", name, *options], folder / name)
         with Progress("Waiting for the learner", 1.0, None) as progress:
-            await_version(
-                endpoint,
-                FULL_SWING if actors else 0,
-                START_S,
-                lambda done, total, note: progress.update(done, note, total=total),
-            )
-        if not actors:
-            give_graph(endpoint, RoomId.parse(_ROOM))
+
+            def show(done: float, total: float, note: str) -> None:
+                for child in children:
+                    child.keep_running()
+                progress.update(done, note, total=total)
+
+            await_version(endpoint, 0, START_S, show)
+            if not actors:
+                give_graph(endpoint, RoomId.parse(_ROOM))
+            options = ["--connect", endpoint, *as_arguments({"scene": _ROOM, "cache": cache})]
+            for number in range(actors):
+                name = f"actor-{number}"
+                children.start(name, ["actor", "--name", name, *options], folder / name)
+            await_version(endpoint, FULL_SWING if actors else 0, START_S, show)
         yield endpoint
