@@ -16,7 +16,7 @@ def test_every_acknowledged_push_is_a_line_as_soon_as_it_is_noted(tmp_path: Path
     episodes = EpisodesPush("a0", 77, 0, episodes=(samples.EPISODE,) * 3)
     room = RoomGraphPush("a0", 77, 1, samples.ROOM, "d1", TARGETS, *samples.zone_graph())
     with Journal(path) as journal:
-        for tries, push in enumerate((samples.gradient_push(4), episodes, room), start=1):
+        for tries, push in enumerate((samples.gradient_push(4), episodes, room, samples.trajectory_push()), start=1):
             journal.write(push, Accepted(2, 10 + tries), tries)
             lines = [json.loads(line) for line in path.read_text().splitlines()]
             assert len(lines) == tries, "a killed actor loses none"
@@ -26,10 +26,11 @@ def test_every_acknowledged_push_is_a_line_as_soon_as_it_is_noted(tmp_path: Path
         {"kind": "gradient", "sequence": 4, "version": 11, "computed_on": [1, 5], "frames": 40, "tries": 1},
         {"kind": "episodes", "sequence": 0, "version": 12, "episodes": 3, "tries": 2},
         {"kind": "room_graph_push", "sequence": 1, "version": 13, "room": "kitchen/3", "tries": 3},
+        {"kind": "trajectory", "sequence": 2, "version": 14, "computed_on": [1, 5], "frames": 13, "tries": 4},
     ]
     with Journal(path) as journal:
         journal.write(episodes, Accepted(2, 20), 1)
-    assert len(path.read_text().splitlines()) == 4, "an actor that comes back goes on with its journal"
+    assert len(path.read_text().splitlines()) == 5, "an actor that comes back goes on with its journal"
 
 
 def test_a_file_that_cannot_be_written_is_said_in_one_sentence(tmp_path: Path) -> None:
