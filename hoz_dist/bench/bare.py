@@ -28,7 +28,7 @@ class BareReplies(Closing):
 
     def close(self) -> None:
         """Stop answering."""
-        self._queryable.undeclare()
+        self._queryable.undeclare()  # type: ignore[no-untyped-call]
         self._thread.join()
 
     def _run(self) -> None:

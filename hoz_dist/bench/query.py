@@ -4,26 +4,23 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, contextmanager
 from functools import partial
-from typing import Final, Literal
+from typing import Literal
 
 from hoz_dist.bench.bare import ask_bare
 from hoz_dist.bench.report import Metric
 from hoz_dist.bench.samples import room_graph
 from hoz_dist.bench.timing import Contender, Progress, run_contests
 from hoz_dist.client import HozClient
-from hoz_dist.errors import ConnectionFailedError, HozError, NotFoundError
+from hoz_dist.errors import NotFoundError
 from hoz_dist.nav.rooms import RoomId
-from hoz_dist.waiting import Backoff, Deadline
 from hoz_dist.wire.protocol.codec import encode
 from hoz_dist.wire.protocol.graphs import scene_graph_reply
 from hoz_dist.wire.transport.session import open_client
 from learner.service import catalogue_digests
 from workers.link import LearnerLink
 
-FULL_SWING: Final = 50
-"""Version of the parameters at which a training is in full swing."""
 State = Literal["idle", "training"]
 """What the learner does meanwhile."""
 
@@ -91,31 +88,6 @@ def give_graph(endpoint: str, room: RoomId) -> None:
     """
     with open_client(endpoint) as session, LearnerLink(session, "bench", None, threading.Event()) as link:
         link.push_room_graph(room_graph(room, catalogue_digests()[str(room)], link.config.zones))
-
-
-def await_version(endpoint: str, version: int, timeout_s: float, progress: Progress) -> None:
-    """Wait until a learner answers, and its parameters have a version.
-
-    Args:
-        endpoint: Where it listens.
-        version: The version.
-        timeout_s: How long to wait.
-        progress: Told how far the learner is; may raise to end the wait.
-
-    Raises:
-        ConnectionFailedError: It does not get so far in time.
-    """
-    deadline, backoff = Deadline(timeout_s), Backoff(threading.Event())
-    while not deadline.passed:
-        now = -1
-        with suppress(HozError), HozClient(endpoint) as client:
-            now = client.status()["version"]
-        progress(max(now, 0), version, "updates")
-        if now >= version:
-            return
-        backoff.pause(deadline)
-    message = f"The learner at {endpoint} did not come to version {version} within {timeout_s:g} s."
-    raise ConnectionFailedError(message)
 
 
 def scene_with_graph(endpoint: str) -> str:

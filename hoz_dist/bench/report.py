@@ -62,13 +62,15 @@ class Report:
 def this_machine() -> Machine:
     """Describe this machine as far as speed depends on it; neither its name nor any path."""
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    versions = {name: importlib.metadata.version(package) for name, package in _PACKAGES.items()}
     return {
         "cpu": _cpu(),
         "cores": len(os.sched_getaffinity(0)),
         "memory_gib": round(memory / 2**30, 1),
         "kernel": f"{platform.system()} {platform.release()}",
         "python": platform.python_version(),
-    } | {name: importlib.metadata.version(package) for name, package in _PACKAGES.items()}
+        **versions,
+    }
 
 
 def _cpu() -> str:

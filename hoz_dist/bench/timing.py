@@ -48,7 +48,7 @@ def _turns(
     turns = (repeats + 1) * len(contenders)
     done = 0
     for repeat in range(repeats + 1):
-        order = list(contenders) if repeat % 2 else list(reversed(contenders))
+        order = list(contenders)[:: 1 if repeat % 2 else -1]
         for name in order:
             yield done / turns, name
             figure = contenders[name]()

@@ -80,7 +80,7 @@ def bytes_of_gradient(codec: Compression, size: int) -> int:
 
 @contextmanager
 def _large(endpoint: str, shared_endpoint: str, parameters: int, seconds: float) -> Iterator[Mapping[str, Contender]]:
-    source = memoryview(gradient(parameters)).cast("B")
+    source = gradient(parameters).data.cast("B")
     with ExitStack() as stack:
         contenders: dict[str, Contender] = {"copy": partial(_milliseconds, lambda: bytearray(source), seconds)}
         for where, suffix in ((endpoint, ""), (shared_endpoint, ", shared memory")):

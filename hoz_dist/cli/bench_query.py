@@ -1,20 +1,28 @@
 """`hoz-dist bench query`: how soon a learner answers, idle or while it trains."""
 
 import tempfile
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import click
 
 from hoz_dist.cli.bench_options import benchmark_options, show_metrics
 from hoz_dist.cli.options import cache_option
 from hoz_dist.cli.ports import free_endpoint
+from hoz_dist.errors import HozError
+
+if TYPE_CHECKING:
+    from hoz_dist.cli.processes import Children
+    from hoz_dist.client import HozClient
 
 START_S: Final = 300.0
 """How long a training may take to come into full swing, the rendering of its room included, seconds."""
+FULL_SWING: Final = 50
+"""Updates after which a training is in full swing."""
 _ROOM: Final = "kitchen/1"
 """The only room of a training: more would only make it start later."""
 
@@ -80,29 +88,48 @@ def _learner(connect: str | None, actors: int, cache: Path | None) -> Iterator[s
         yield connect
         return
 
-    from hoz_dist.bench.query import FULL_SWING, await_version, give_graph
+    from hoz_dist.bench.query import give_graph
+    from hoz_dist.cli import launch
     from hoz_dist.cli.processes import Children
-    from hoz_dist.cli.progress import Progress
     from hoz_dist.cli.run_options import as_arguments
     from hoz_dist.nav.rooms import RoomId
 
     endpoint = free_endpoint()
     with tempfile.TemporaryDirectory(prefix="hoz-dist-") as logs, Children() as children:
         folder = Path(logs)
-        children.start("learner", ["learner", "--listen", endpoint, "--run", str(folder / "bench")], folder / "learner")
-        with Progress("Waiting for the learner", 1.0, None) as progress:
-
-            def show(done: float, total: float, note: str) -> None:
-                for child in children:
-                    child.keep_running()
-                progress.update(done, note, total=total)
-
-            await_version(endpoint, 0, START_S, show)
+        client = launch.connect(
+            endpoint, launch.start_learner(children, endpoint, folder / "bench", (), folder / "learner")
+        )
+        assert client is not None  # noqa: S101 - a run without a budget does not end
+        with client:
             if not actors:
                 give_graph(endpoint, RoomId.parse(_ROOM))
-            options = ["--connect", endpoint, *as_arguments({"scene": _ROOM, "cache": cache})]
+            options = as_arguments({"scene": _ROOM, "cache": cache})
             for number in range(actors):
                 name = f"actor-{number}"
-                children.start(name, ["actor", "--name", name, *options], folder / name)
-            await_version(endpoint, FULL_SWING if actors else 0, START_S, show)
-        yield endpoint
+                launch.start_actor(children, endpoint, name, options, folder / name)
+            if actors:
+                _await_full_swing(client, children)
+            yield endpoint
+
+
+def _await_full_swing(client: "HozClient", children: "Children") -> None:
+    """Wait until the training has come some way.
+
+    Raises:
+        HozError: A process failed, or the training does not come so far in time.
+    """
+    from hoz_dist.cli.progress import Progress
+    from hoz_dist.waiting import Backoff, Deadline
+
+    deadline, backoff = Deadline(START_S), Backoff(threading.Event())
+    with Progress("Waiting for the training", FULL_SWING, "updates") as progress:
+        while (version := client.status()["version"]) < FULL_SWING:
+            for child in children:
+                child.keep_running()
+            if deadline.passed:
+                message = f"The training did not come to {FULL_SWING} updates within {START_S:g} s."
+                raise HozError(message)
+            progress.update(version)
+            backoff.pause(deadline)
+        progress.update(FULL_SWING)

@@ -65,4 +65,5 @@ class RowTable(Generic[Scalar]):
             columns: Which element of each, [M].
         """
         assert self._rows is not None  # noqa: S101 - rows of success and transitions are small
-        return self._rows.ravel().take(indices * self._rows.shape[1] + columns)
+        picked: NDArray[Scalar] = self._rows.ravel().take(indices * self._rows.shape[1] + columns)
+        return picked

@@ -1,5 +1,6 @@
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from functools import partial
 
 from hoz_dist.bench.timing import Contender, rate, run_contests, seconds_per_call
 
@@ -32,7 +33,7 @@ def test_contenders_take_turns_and_the_first_round_warms_up() -> None:
             return float(len(turns))
 
         open_contests.extend(names)
-        yield {name: lambda name=name: measure(name) for name in names}
+        yield {name: partial(measure, name) for name in names}
         open_contests.clear()
 
     told: list[tuple[float, float, str]] = []

@@ -16,8 +16,8 @@ def test_parts_of_joined_rows_are_what_was_added_in_float32(channels: int) -> No
         table.append(*block)
     indices = rng.integers(8, size=(3, 4))
     taken = table.take(indices)
-    for part, blocks in zip(taken, (halves, boxes), strict=True):
-        assert part.dtype == np.float32
-        assert np.array_equal(part, np.concatenate(blocks)[indices])
+    assert [part.dtype for part in taken] == [np.float32, np.float32]
+    assert np.array_equal(taken[0], np.concatenate(halves)[indices])
+    assert np.array_equal(taken[1], np.concatenate(boxes)[indices])
     taken[1][:] = 7.0
     assert not (table.take(indices)[1] == 7.0).any()  # what is taken is a copy
