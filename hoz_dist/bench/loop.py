@@ -1,6 +1,5 @@
 """Training in one process, without Zenoh: the limit of what an actor and a learner can do together."""
 
-import os
 import zlib
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -40,7 +39,6 @@ def train_in_process(
     weights: Path | None,
     name: str,
     timings: Path,
-    niceness: int,
     gate: Gate,
     *,
     ready: Callable[[], None],
@@ -55,13 +53,11 @@ def train_in_process(
         weights: Weights of the encoder.
         name: Name of the actor; seeds the episodes.
         timings: File that says after each update what its stages took.
-        niceness: How much it lets other processes go first, as actors do.
         gate: Whether to train, or to wait.
         ready: Called before the rooms are got ready.
         stopped: Waits some seconds for the word to stop, and tells whether it came.
     """
     torch.set_num_threads(1)
-    os.nice(niceness)
     rng = np.random.default_rng([config.seed, zlib.crc32(name.encode())])
     clock, env = StageClock(), BatchEnv(config.batch, rng)
     collector = Collector(config, env, rng, clock)

@@ -2,6 +2,7 @@
 
 import multiprocessing
 import os
+import signal
 import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
@@ -16,7 +17,7 @@ from hoz_dist.bench.training import Trainers
 from hoz_dist.cli.bench_options import command_line, repeats_option, show_metrics
 from hoz_dist.cli.options import cache_option, force_option, json_option
 from hoz_dist.cli.ports import free_endpoint
-from hoz_dist.cli.processes import ACTOR_NICENESS, Child, Children
+from hoz_dist.cli.processes import Child, Children
 from hoz_dist.cli.run_options import as_arguments, run_config, run_options
 from hoz_dist.errors import HozError, InvalidValueError
 from hoz_dist.nav.categories import SCENES
@@ -189,7 +190,7 @@ class _Run(Trainers):
 
         with ExitStack() as stack:
             self._folder.mkdir()
-            self._children = stack.enter_context(Children())
+            self._children = stack.enter_context(Children(orphaned=signal.SIGKILL))
             endpoint, run = free_endpoint(), self._folder / "bench"
             learner = start_learner(self._children, endpoint, run, self._learner_words, self._folder / "learner.log")
             self._client = stack.enter_context(_client(endpoint, learner))
@@ -258,7 +259,7 @@ def _in_process(
     paths = [folder / f"alone-{number}.jsonl" for number in range(count)]
     with ExitStack() as stack:
         for path in paths:
-            work = partial(train_in_process, config, rooms, cache, weights, path.stem, path, ACTOR_NICENESS, gate)
+            work = partial(train_in_process, config, rooms, cache, weights, path.stem, path, gate)
             stack.enter_context(companion(work))
         yield _Loops(paths, gate)
 

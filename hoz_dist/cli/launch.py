@@ -9,7 +9,7 @@ from typing import Any, Final
 
 import click
 
-from hoz_dist.cli.processes import ACTOR_NICENESS, Child, Children
+from hoz_dist.cli.processes import Child, Children
 from hoz_dist.cli.progress import Progress
 from hoz_dist.client import HozClient
 from hoz_dist.errors import ConnectionFailedError, HozError
@@ -70,7 +70,7 @@ def start_learner(children: Children, endpoint: str, run: Path, options: Sequenc
 
 def start_actor(children: Children, endpoint: str, name: str, options: Sequence[str], log: Path) -> Child:
     """Start an actor of the learner at an endpoint."""
-    return children.start(name, ["actor", "--connect", endpoint, "--name", name, *options], log, ACTOR_NICENESS)
+    return children.start(name, ["actor", "--connect", endpoint, "--name", name, *options], log)
 
 
 def connect(endpoint: str, learner: Child) -> HozClient | None:

@@ -6,7 +6,6 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator, Sequence
-from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Final, Self
@@ -19,26 +18,22 @@ STOP_S: Final = 20.0
 """How long a process may take to stop cleanly before it is killed, seconds."""
 MOST_RESTARTS: Final = 5
 """Restarts of one process; one that dies again and again has another reason than a passing one."""
-ACTOR_NICENESS: Final = 5
-"""Actors use all processors all the time. The learner, for which they all wait, and who asks it, go first."""
 
 
 class Child:
     """One `hoz-dist` process."""
 
-    def __init__(self, name: str, arguments: Sequence[str], log: Path, niceness: int = 0) -> None:
+    def __init__(self, name: str, arguments: Sequence[str], log: Path) -> None:
         """Start the process.
 
         Args:
             name: For messages, such as ``actor-0``.
             arguments: The words after `hoz-dist`.
             log: File that its output is appended to.
-            niceness: How much it lets other processes go first, 0 to 19.
         """
         self.name = name
         self.log = log
         self._arguments = tuple(arguments)
-        self._niceness = niceness
         self._restarts = 0
         self._process = self._start()
 
@@ -70,7 +65,7 @@ class Child:
         return last if last.endswith(".") else f"{last} (see {self.log})."
 
     def pause(self) -> None:
-        """Let the process stand still."""
+        """Let the process stand still; see ``orphaned``."""
         self._process.send_signal(signal.SIGSTOP)
 
     def resume(self) -> None:
@@ -94,8 +89,15 @@ class Child:
 
     def _start(self) -> subprocess.Popen[bytes]:
         with self.log.open("ab") as output:
-            process = subprocess.Popen(  # noqa: S603 - our own command
-                [sys.executable, "-m", "hoz_dist.cli.child", str(os.getpid()), *self._arguments],
+            return subprocess.Popen(  # noqa: S603 - our own command
+                [
+                    sys.executable,
+                    "-m",
+                    "hoz_dist.cli.child",
+                    str(os.getpid()),
+                    str(int(self._orphaned)),
+                    *self._arguments,
+                ],
                 stdin=subprocess.DEVNULL,
                 stdout=output,
                 stderr=subprocess.STDOUT,
@@ -103,20 +105,22 @@ class Child:
                 # Ctrl-C reaches this process alone, which then stops its children in order.
                 start_new_session=True,
             )
-        if self._niceness:
-            _let_others_first(process.pid, self._niceness)
-        return process
 
 
 class Children:
-    """Processes that stop together, the last one started first; use it in a ``with`` statement."""
+    """Processes that stop together, the last one started first; use it in a ``with`` statement.
 
-    def __init__(self) -> None:
+    Args:
+        orphaned: Signal that they get when this process dies; those that may be paused hear none but SIGKILL.
+    """
+
+    def __init__(self, orphaned: signal.Signals = signal.SIGTERM) -> None:
+        self._orphaned = orphaned
         self._children: list[Child] = []
 
-    def start(self, name: str, arguments: Sequence[str], log: Path, niceness: int = 0) -> Child:
+    def start(self, name: str, arguments: Sequence[str], log: Path) -> Child:
         """Start a process; see `Child`."""
-        child = Child(name, arguments, log, niceness)
+        child = Child(name, arguments, log)
         self._children.append(child)
         return child
 
@@ -132,11 +136,3 @@ class Children:
         for child in reversed(self._children):
             child.terminate()
             child.wait()
-
-
-def _let_others_first(process: int, niceness: int) -> None:
-    """Make a process that has just been started, and what it starts, give way to others."""
-    with suppress(OSError):  # it may have ended
-        os.setpriority(os.PRIO_PROCESS, process, niceness)
-        # Linux may weigh sessions against each other, and processes only within them; this one has its own.
-        Path(f"/proc/{process}/autogroup").write_text(str(niceness), encoding="ascii")
