@@ -23,17 +23,21 @@ MOST_RESTARTS: Final = 5
 class Child:
     """One `hoz-dist` process."""
 
-    def __init__(self, name: str, arguments: Sequence[str], log: Path) -> None:
+    def __init__(
+        self, name: str, arguments: Sequence[str], log: Path, orphaned: signal.Signals = signal.SIGTERM
+    ) -> None:
         """Start the process.
 
         Args:
             name: For messages, such as ``actor-0``.
             arguments: The words after `hoz-dist`.
             log: File that its output is appended to.
+            orphaned: Signal that it gets when this process dies; one that may be paused hears none but SIGKILL.
         """
         self.name = name
         self.log = log
         self._arguments = tuple(arguments)
+        self._orphaned = orphaned
         self._restarts = 0
         self._process = self._start()
 
@@ -88,16 +92,10 @@ class Child:
             self._process.wait()
 
     def _start(self) -> subprocess.Popen[bytes]:
+        parent = f"{os.getpid()}:{int(self._orphaned)}"
         with self.log.open("ab") as output:
             return subprocess.Popen(  # noqa: S603 - our own command
-                [
-                    sys.executable,
-                    "-m",
-                    "hoz_dist.cli.child",
-                    str(os.getpid()),
-                    str(int(self._orphaned)),
-                    *self._arguments,
-                ],
+                [sys.executable, "-m", "hoz_dist.cli.child", parent, *self._arguments],
                 stdin=subprocess.DEVNULL,
                 stdout=output,
                 stderr=subprocess.STDOUT,
@@ -120,7 +118,7 @@ class Children:
 
     def start(self, name: str, arguments: Sequence[str], log: Path) -> Child:
         """Start a process; see `Child`."""
-        child = Child(name, arguments, log)
+        child = Child(name, arguments, log, self._orphaned)
         self._children.append(child)
         return child
 

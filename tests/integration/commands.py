@@ -69,7 +69,7 @@ def hoz_dist(*words: str, **environment: str) -> subprocess.CompletedProcess[str
 def children_of(parent: int) -> list[int]:
     """Return the processes that a `hoz-dist train` of this id has started and that run, also after its own end."""
     # It tells each of them its own process id.
-    mark = f"hoz_dist.cli.child\0{parent}\0".encode()
+    mark = f"hoz_dist.cli.child\0{parent}:".encode()
     found = []
     for entry in Path("/proc").iterdir():
         try:
