@@ -1,7 +1,9 @@
 """Rollouts by pose ids: small, and of steps that can follow each other."""
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -35,6 +37,14 @@ def test_a_frame_takes_some_twenty_bytes_whatever_the_policy_and_the_pictures(
     assert size / push.frames < 30 < MOST_PER_FRAME
     assert size <= most_bytes(batch, steps)
     assert size >= (FRAME_BYTES - 1) * batch * steps
+
+
+def test_the_document_says_how_large_a_rollout_is_and_what_the_flags_are() -> None:
+    document = (Path(__file__).parents[3] / "docs" / "wire-protocol.md").read_text(encoding="utf-8")
+    text = document.partition("### trajectory\n")[2].partition("\n### ")[0]
+    assert f"At most {FRAME_BYTES} B (T + 1) bytes" in text
+    told = re.findall(r"(\d+): ", text[text.index("sum of") : text.index("`scene`, `current`")])
+    assert told == [str(int(flag)) for flag in Flag]
 
 
 def test_values_arrive_as_they_were() -> None:
