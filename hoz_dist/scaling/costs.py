@@ -65,7 +65,9 @@ class Costs:
     learner_wire: float
     """Zenoh's own threads, as a router."""
     notify: float = 2e-6
-    """Tell one actor that there are new parameters."""
+    """Tell one actor that there are new parameters, in the learner's own thread."""
+    notify_wire: float = 1e-5
+    """The same in Zenoh's threads."""
     fixed: float = 2e-4
     """The part of ``receive``, ``apply``, ``publish`` and ``serve`` that fewer parameters would cost as well, each."""
     gil: float = 0.2

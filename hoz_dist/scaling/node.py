@@ -229,6 +229,7 @@ class Node:
         """Make new parameters known."""
         yield from self._compute(self.costs.publish)
         yield self.host.use(self._clients * self.costs.notify)
+        self.host.use(self._clients * self.costs.notify_wire)  # nobody waits for it
 
     def _put_off(self, request: Request) -> None:
         self.counted.busy += 1
