@@ -28,6 +28,8 @@ pytestmark = pytest.mark.integration
         (GRADS, encode(samples.MESSAGES[1]), None, "kind"),
         (KEYS.grads("a1"), encoded_gradient(0), None, "identity"),
         (KEYS.rollouts("a1"), encode(samples.MESSAGES[1]), None, "identity"),
+        (KEYS.rollouts("a1"), encode(samples.trajectory_push()), None, "identity"),
+        (GRADS, encode(samples.trajectory_push()), None, "kind"),
         (KEYS.room("a0", RoomId("kitchen", 4)), encode(samples.MESSAGES[2]), None, "identity"),
         (KEYS.all_grads, encoded_gradient(0), None, "identity"),
     ],
