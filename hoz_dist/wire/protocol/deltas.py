@@ -39,7 +39,6 @@ def quantise(vector: NDArray[np.float32], base: NDArray[np.float32]) -> Quantise
         for start in range(0, size, _AT_ONCE):
             stop = min(start + _AT_ONCE, size)
             length, blocks = stop - start, -(-(stop - start) // BLOCK)
-            scratch[length : blocks * BLOCK] = 0.0
             difference = scratch[:length]
             np.subtract(vector[start:stop], base[start:stop], out=difference)
             np.abs(difference, out=magnitudes[:length])

@@ -121,6 +121,8 @@ def test_a_reader_of_deltas_gets_a_base_in_full_and_then_a_byte_for_each_paramet
             fetched = follower.fetch((1, version), WAIT_S)
             assert fetched.head.version == version
             np.testing.assert_allclose(fetched.vector, vector, atol=1e-4)
+        with ParametersFollower(client, KEYS, threading.Event(), deltas=True) as late:
+            assert late.fetch((1, version), WAIT_S).head.version == version, "though the base is older"
         # Who has the first base, or none, gets the one of now.
         for held in (base, "none"):
             (answer,) = ask(client, f"{KEYS.shard(0)}?reader=b;base={held}", timeout_s=5.0)
@@ -139,8 +141,8 @@ def test_a_reader_of_deltas_goes_on_with_the_learner_of_another_epoch(endpoint: 
         open_client(endpoint) as client,
         ParametersFollower(client, KEYS, threading.Event(), deltas=True) as follower,
     ):
-        # The new learner begins with what the old one had two versions before.
-        for epoch, first in ((1, 5), (2, 4)):
+        # The new learner begins with what the old one had a version before, which is the reader's base.
+        for epoch, first in ((1, 5), (2, 5)):
             with ParametersPublisher(session, KEYS) as publisher:
                 for version in (first, first + 1):
                     publisher.publish(epoch, version, vector + np.float32(version))
