@@ -205,7 +205,8 @@ class Learner:
 
     def _handle(self, request: Request, now: float) -> None:
         try:
-            with self._clock("apply"):
+            # What a rollout takes is its gradient; applying it is a small part of that.
+            with self._clock("differentiate" if isinstance(request.message, TrajectoryPush) else "apply"):
                 effects = self._core.handle(_event_of(request), now)
         except Exception:  # noqa: BLE001 - logged in full
             # Whatever a push manages to provoke must not stop the training, here and after each restart.
