@@ -25,7 +25,9 @@ def test_memory_is_used_again_when_nothing_refers_to_it() -> None:
 
 
 @pytest.mark.parametrize(
-    "part_of", [lambda array: array[10:20].reshape(2, 5)[1], lambda array: torch.from_numpy(array)[3:]]
+    "part_of",
+    [lambda array: array[10:20].reshape(2, 5)[1], lambda array: torch.from_numpy(array)[3:]],
+    ids=["part", "tensor"],
 )
 def test_a_part_or_a_tensor_keeps_the_memory(part_of: Callable[[np.ndarray], object]) -> None:
     buffers = Buffers()
