@@ -112,8 +112,8 @@ class TopK:
     def __init__(self, size: int) -> None:
         self._count = max(round(TOP_SHARE * size), 1)
         self._magnitudes = np.empty(size, np.float32)
-        # A prime stride: rows of weight matrices have rounder lengths, and each entry of a row its own scale.
-        self._stride = _prime_from(max(size // _SAMPLE, 1))
+        # Odd: rows of weight matrices have even lengths, and each entry of a row its own scale.
+        self._stride = size // _SAMPLE | 1
 
     def take(self, vector: Tensor, largest: float) -> TopKGradient:
         """See `Codec.take`."""
@@ -145,10 +145,3 @@ class TopK:
 
 def _bits(halves: Tensor) -> NDArray[np.uint16]:
     return halves.view(torch.int16).numpy().view(np.uint16)
-
-
-def _prime_from(number: int) -> int:
-    """Return the least prime that is not below a number; 1 for 1."""
-    while any(number % divisor == 0 for divisor in range(2, int(number**0.5) + 1)):
-        number += 1
-    return number

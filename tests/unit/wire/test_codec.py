@@ -1,5 +1,6 @@
 """Every message survives the wire; hostile bytes are rejected by name, and never do anything else."""
 
+import tracemalloc
 from contextlib import suppress
 from typing import Any
 
@@ -97,6 +98,16 @@ def test_decoding_a_gradient_does_not_copy_it_again() -> None:
     assert np.shares_memory(decoded, received)
     assert decoded.ctypes.data - received.ctypes.data == len(data) - 448  # 400 bytes, up to a multiple of 64
     assert not decoded.flags.writeable
+
+
+def test_decoding_a_large_gradient_takes_hardly_any_memory() -> None:
+    data = encode(samples.gradient_push(size=2_000_000))
+    tracemalloc.start()
+    decode(data, GradientPush)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert len(data) > 8e6
+    assert peak < 0.5e6
 
 
 @pytest.mark.parametrize("codec", ["bf16", "int8", "topk"])

@@ -73,9 +73,9 @@ def tied(size: int) -> Vector:
 
 
 def periodic(size: int) -> Vector:
-    """Large wherever a stride that is a power of two looks, and small elsewhere."""
+    """Large only where `TopK` looks, so that it expects more large entries than there are."""
     values = vector(3, size)
-    values[np.arange(size) % 64 != 0] *= 1e-3
+    values[np.arange(size) % TopK(size)._stride != 0] *= 1e-6
     return values
 
 
@@ -102,15 +102,16 @@ def test_topk_sends_the_largest(size: int, make: Callable[[int], Vector]) -> Non
     assert (received(sent)[others] == 0).all()
 
 
-@pytest.mark.parametrize("codec", CODECS)
-def test_nothing_that_is_sent_is_longer_than_the_bound(codec: type[Bf16 | Int8 | TopK]) -> None:
-    just_above_half = np.float32(1.0 + 2.0**-8 + 2.0**-20)  # bf16 rounds all of them up
-    some = np.full(1024, 0.5001, np.float32)
-    some[::INT8_BLOCK] = 127.0  # and int8 all but one of each block
-    for values in (np.full(1024, just_above_half), some, vector(4, norm=50.0)):
-        sent, _ = taken(codec, values, 2.0)
+@pytest.mark.parametrize(("codec", "size"), [(Bf16, 1024), (Int8, 1024), (TopK, 102_400)])
+def test_nothing_that_is_sent_is_longer_than_the_bound(codec: type[Bf16 | Int8 | TopK], size: int) -> None:
+    above_half = 1.0 + 2.0**-8 + 2.0**-20  # bf16 rounds it up
+    uneven_blocks = np.full(size, 0.5001, np.float32)
+    uneven_blocks[::INT8_BLOCK] = 127.0  # and int8 all of a block but one
+    # 1024 equal entries travel, each just above the half once they are scaled down.
+    for values, largest in ((np.full(size, 5.0, np.float32), 32 * above_half), (uneven_blocks, 2.0)):
+        sent, _ = taken(codec, values, largest)
         norm = np.linalg.norm(received(sent).astype(np.float64))
-        assert 1.98 < norm <= 2.0 * (1 + 1e-5)
+        assert 0.99 * largest < norm <= largest * (1 + 1e-5)
 
 
 @pytest.mark.parametrize("codec", CODECS)
