@@ -67,6 +67,8 @@ def bench_wire(
         "wire_push_shared_memory_ms": Metric.of(samples["push, shared memory"], "ms", copy),
         "wire_fetch_ms": Metric.of(samples["fetch"], "ms", copy),
         "wire_fetch_shared_memory_ms": Metric.of(samples["fetch, shared memory"], "ms", copy),
+        "wire_fetch_delta_ms": Metric.of(samples["delta"], "ms", copy),
+        "wire_fetch_delta_shared_memory_ms": Metric.of(samples["delta, shared memory"], "ms", copy),
         "wire_small_push_ms": Metric.of(samples["small push"], "ms", samples["bare question"]),
         **{f"wire_gradient_bytes_{codec}": Metric.of([size], "bytes") for codec, size in sizes.items()},
     }
@@ -86,10 +88,12 @@ def _large(endpoint: str, shared_endpoint: str, parameters: int, seconds: float)
         for where, suffix in ((endpoint, ""), (shared_endpoint, ", shared memory")):
             memory = stack.enter_context(SharedMemory(on=bool(suffix)))
             session = stack.enter_context(open_client(where, shared_memory=memory.on))
-            follower = stack.enter_context(ParametersFollower(session, KEYS, threading.Event()))
             push = _pushing(session, memory, parameters)
             contenders["push" + suffix] = partial(_milliseconds, push, seconds)
-            contenders["fetch" + suffix] = partial(_milliseconds, partial(_fetch, follower), seconds)
+            for kind, deltas in (("fetch", False), ("delta", True)):
+                follower = ParametersFollower(session, KEYS, threading.Event(), deltas=deltas)
+                fetch = partial(_fetch, stack.enter_context(follower))
+                contenders[kind + suffix] = partial(_milliseconds, fetch, seconds)
         yield contenders
 
 

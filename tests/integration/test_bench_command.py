@@ -73,7 +73,7 @@ def test_wire_pushes_and_fetches() -> None:
         serving(receive, shared, 50_000, shared_memory=True),
     ):
         metrics = bench_wire(plain, shared, 50_000, ("fp32", "topk"), seconds=MOMENT_S, repeats=1, progress=silent)
-    limited = {f"wire_{what}{how}_ms" for what in ("push", "fetch") for how in ("", "_shared_memory")}
+    limited = {f"wire_{what}{how}_ms" for what in ("push", "fetch", "fetch_delta") for how in ("", "_shared_memory")}
     limited.add("wire_small_push_ms")
     assert {name for name, metric in metrics.items() if metric.limit} == limited
     assert set(metrics) - limited == {"wire_gradient_bytes_fp32", "wire_gradient_bytes_topk"}
