@@ -209,6 +209,8 @@ class _Run(Trainers):
         return self
 
     def __exit__(self, *_: object) -> None:
+        for actor in self._actors:
+            actor.terminate()  # all at once, before each is waited for
         self._stack.close()
 
     def resume(self) -> None:
