@@ -1,7 +1,6 @@
 """Rows of several arrays side by side, so that what a batch perceives is one look-up and one copy."""
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,14 +19,18 @@ class JoinedTable:
 
     def __init__(self) -> None:
         """Make an empty table."""
-        self._shapes: list[tuple[int, ...]] = []
+        self._width = 0
+        self._parts: list[tuple[slice, tuple[int, ...]]] = []
+        """Columns of each array's rows, and their shape."""
         self._joined: RowTable[np.float32] | None = None
         self._apart: list[RowTable[np.floating]] = []
 
     def append(self, *arrays: Array) -> None:
         """Add rows of each array, [rows, ...]; the arrays' shapes are those of the first call but for the rows."""
-        if not self._shapes:
-            self._shapes = [array.shape[1:] for array in arrays]
+        if not self._parts:
+            for array in arrays:
+                start, self._width = self._width, self._width + math.prod(array.shape[1:])
+                self._parts.append((slice(start, self._width), array.shape[1:]))
             if self._width * np.dtype(np.float32).itemsize < LARGE_ROW_BYTES:
                 self._joined = RowTable()
             else:
@@ -50,15 +53,6 @@ class JoinedTable:
             return [table.take(indices).astype(np.float32, copy=False) for table in self._apart]
         return self._split(self._joined.take(indices))
 
-    @property
-    def _width(self) -> int:
-        return sum(map(math.prod, self._shapes))
-
     def _split(self, rows: NDArray[np.float32]) -> list[NDArray[np.float32]]:
         """Return the parts of joined rows, [..., width], as views of them."""
-        stops = np.cumsum([math.prod(shape) for shape in self._shapes]).tolist()
-        starts: Sequence[int] = [0, *stops[:-1]]
-        return [
-            rows[..., start:stop].reshape(*rows.shape[:-1], *shape)
-            for start, stop, shape in zip(starts, stops, self._shapes, strict=True)
-        ]
+        return [rows[..., columns].reshape(*rows.shape[:-1], *shape) for columns, shape in self._parts]
