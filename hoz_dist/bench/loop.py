@@ -1,5 +1,6 @@
 """Training in one process, without Zenoh: the limit of what an actor and a learner can do together."""
 
+import os
 import zlib
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -58,6 +59,7 @@ def train_in_process(
         stopped: Waits some seconds for the word to stop, and tells whether it came.
     """
     torch.set_num_threads(1)
+    os.setsid()  # as actors have one each: Linux divides processors between sessions first
     rng = np.random.default_rng([config.seed, zlib.crc32(name.encode())])
     clock, env = StageClock(), BatchEnv(config.batch, rng)
     collector = Collector(config, env, rng, clock)
