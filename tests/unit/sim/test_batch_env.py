@@ -170,3 +170,16 @@ def test_the_seed_decides_everything() -> None:
 
     assert np.array_equal(run(1), run(1))
     assert not np.array_equal(run(1), run(2))
+
+
+def test_places_tell_what_is_observed() -> None:
+    env = BatchEnv(8, np.random.default_rng(0))
+    rooms = [random_views(RoomId("kitchen", number), seed=number) for number in (1, 2)]
+    for views in rooms:
+        env.add_room(views)
+    for action in (0, 1, 5, 2):
+        observation, places = env.observe(), env.places()
+        for slot, (room, view) in enumerate(zip(*places, strict=True)):
+            np.testing.assert_array_equal(observation.detections[slot], env.rooms[room].detections[view])
+        env.step(np.full(8, action))
+        assert len(set(places.room)) == 2
