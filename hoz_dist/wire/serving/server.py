@@ -91,12 +91,11 @@ class Server(Closing):
         self._publishers: dict[str, NewestPublisher] = {}
         for graph in graphs:
             self.put_graph(graph)
-        config = encode(snapshots.config)
         handlers: dict[str, Callable[[Query], None]] = {
             keys.all_grads: lambda query: self._receive(query, GradientPush),
             keys.all_rollouts: lambda query: self._receive(query, EpisodesPush, TrajectoryPush),
             keys.all_rooms: lambda query: self._receive(query, RoomGraphPush),
-            keys.config: self._limited(lambda query: reply(query, keys.config, config)),
+            keys.config: self._limited(lambda query: answer(query, keys.config, snapshots.config)),
             keys.status: self._limited(lambda query: answer(query, keys.status, snapshots.status())),
             keys.all_graphs: self._limited(self._answer_graph),
             keys.all_plans: self._limited(self._answer_plan),

@@ -274,7 +274,7 @@ def graphs(session: Session) -> Iterator[list[int]]:
 def publishing(session: Session, key: str, message: Message) -> Iterator[None]:
     """Publish a message, and announce and keep it for those who come late or missed it."""
     publisher = NewestPublisher(session, key)
-    publisher.publish(message)
+    publisher.publish(encode(message))
     try:
         yield
     finally:
