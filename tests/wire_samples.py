@@ -60,7 +60,7 @@ def gradient_push_in(codec: Compression, size: int = 300) -> GradientPush:
     """A gradient in the form of a codec; of 300 entries the blocks of `int8` are a whole one and a part of one."""
     full = gradient_push(size=size)
     assert isinstance(full.gradient, np.ndarray)
-    return replace(full, gradient=Compressor(codec, size, 100.0).compress(full.gradient))
+    return replace(full, gradient=Compressor(codec, size, 100.0).compress(full.gradient, version=1000))
 
 
 def config_reply(epoch: int = 1) -> ConfigReply:

@@ -194,7 +194,7 @@ class LearnerLink(Closing):
             epoch=epoch,
             version=version,
             frames=frames,
-            gradient=self._compressor.compress(gradient),
+            gradient=self._compressor.compress(gradient, version),
         )
         reply = self._push(self._keys.grads(self._actor), push)
         if isinstance(reply, Accepted):

@@ -11,7 +11,7 @@ import torch
 
 from hoz_dist.a3c.compression.compressor import Compressor
 from hoz_dist.bench.report import Metric
-from hoz_dist.bench.samples import gradient
+from hoz_dist.bench.samples import LATE, gradient
 from hoz_dist.bench.timing import Contender, Progress, core_seconds, rate, run_contests, seconds_per_call
 from hoz_dist.config import Compression, RunConfig
 from hoz_dist.policy.parameters import initial_parameters
@@ -70,7 +70,7 @@ def _applying(preset: Preset, codec: Compression, seconds: float) -> Iterator[Ma
     parameters = initial_parameters(config.policy, config.seed)
     core = LearnerCore(config, parameters)
     vector = gradient(parameters.size)
-    compressed = Compressor(codec, vector.size, config.gradient_norm).compress(vector)
+    compressed = Compressor(codec, vector.size, config.gradient_norm).compress(vector, LATE)
     push = GradientPush("a0", 1, 0, core.epoch, 0, config.batch, compressed)
 
     def receive() -> _Received:

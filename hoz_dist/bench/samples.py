@@ -12,6 +12,8 @@ from hoz_dist.nav.rooms import RoomId
 from hoz_dist.policy.graph_bank import GraphBank
 from hoz_dist.policy.settings import PolicySettings
 
+LATE = 1_000_000
+"""A version of the parameters: of the first ones `TopK` sends more than of all others."""
 SEEN_SHARE = 0.15
 """Share of the categories that a view shows."""
 FIRST_SHARE = 1 / 30

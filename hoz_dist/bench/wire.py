@@ -11,7 +11,7 @@ from hoz_dist.a3c.compression.compressor import Compressor
 from hoz_dist.bench.bare import ask_bare
 from hoz_dist.bench.receiver import EPOCH, KEYS
 from hoz_dist.bench.report import Metric
-from hoz_dist.bench.samples import gradient
+from hoz_dist.bench.samples import LATE, gradient
 from hoz_dist.bench.timing import Contender, Progress, rate, run_contests
 from hoz_dist.config import Compression, RunConfig
 from hoz_dist.nav.episode import EpisodeResult
@@ -76,7 +76,7 @@ def bench_wire(
 
 def bytes_of_gradient(codec: Compression, size: int) -> int:
     """Return the length of a push of a gradient [P] that travels by a codec."""
-    compressed = Compressor(codec, size, RunConfig.gradient_norm).compress(gradient(size))
+    compressed = Compressor(codec, size, RunConfig.gradient_norm).compress(gradient(size), LATE)
     return len(encode(GradientPush(ACTOR, 1, 0, EPOCH, 0, 1, compressed)))
 
 

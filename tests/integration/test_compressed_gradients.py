@@ -41,7 +41,7 @@ def test_what_a_codec_leaves_of_a_gradient_arrives_with_the_next_one(
             accepted = link.push_gradient(gradient, 20, parameters.head.stamp)
             assert isinstance(accepted, Accepted)
             parameters = link.parameters((accepted.epoch, accepted.version))
-            push = GradientPush("a", 1, number, 1, number, 20, compressor.compress(gradient))
+            push = GradientPush("a", 1, number, 1, number, 20, compressor.compress(gradient, number))
             compressor.accepted()
             core.handle(GradientReceived(0, push), now=0.0)
         assert parameters.vector.tobytes() == core.parameters.tobytes()

@@ -17,6 +17,10 @@ from hoz_dist.gradient_forms import INT8_BLOCK, Bf16Gradient, Gradient, Int8Grad
 
 TOP_SHARE: Final = 0.01
 """Share of the entries that `TopK` sends."""
+FIRST_SHARE: Final = 0.25
+"""Share that it sends of the very first gradients."""
+HALVED_EVERY: Final = 40
+"""Versions after which that share is half of what it was, until it is `TOP_SHARE` at version 186."""
 _BF16_ROUNDS_UP: Final = 1.0 + 2.0**-8
 """Rounding to 8 significant bits makes no number larger than by this factor."""
 _LEVELS: Final = 127.0
@@ -30,12 +34,13 @@ _PIECE: Final = 512 * INT8_BLOCK
 class Codec(Protocol):
     """One way to send a vector."""
 
-    def take(self, vector: Tensor, largest: float) -> Gradient:
+    def take(self, vector: Tensor, largest: float, version: int) -> Gradient:
         """Return what travels of a vector, and leave in the vector what does not.
 
         Args:
             vector: Float32 [P], finite; changed.
             largest: Largest Euclidean norm of what travels.
+            version: Version of the parameters that the gradient was computed on.
 
         Returns:
             Arrays that are valid until the next call.
@@ -53,7 +58,7 @@ class Bf16:
     def __init__(self, size: int) -> None:
         self._halves = torch.empty(size, dtype=torch.bfloat16)
 
-    def take(self, vector: Tensor, largest: float) -> Bf16Gradient:
+    def take(self, vector: Tensor, largest: float, version: int) -> Bf16Gradient:  # noqa: ARG002 - it sends as much early and late
         """See `Codec.take`."""
         clip_norm(vector, largest / _BF16_ROUNDS_UP)
         for values, halves in zip(torch.split(vector, _PIECE), torch.split(self._halves, _PIECE), strict=True):
@@ -76,7 +81,7 @@ class Int8:
         self._levels = torch.empty(blocks_of(size), INT8_BLOCK, dtype=torch.int8)
         self._scales = torch.empty(blocks_of(size), 1)
 
-    def take(self, vector: Tensor, largest: float) -> Int8Gradient:
+    def take(self, vector: Tensor, largest: float, version: int) -> Int8Gradient:  # noqa: ARG002 - it sends as much early and late
         """See `Codec.take`."""
         clip_norm(vector, largest)
         sent = self._padded.view(-1)[: self._size]
@@ -101,6 +106,9 @@ class Int8:
 class TopK:
     """Sends the entries of the largest magnitude, `TOP_SHARE` of all, as bfloat16.
 
+    In the first versions of the parameters it sends more, as Lin et al. [2018] do: then gradients agree with each other
+    and every entry counts, since Adam moves all entries alike, however small their gradients are.
+
     The largest 1% hold at least 1% of the sum of squares, so what is left of gradients no longer than the bound of the
     norm never grows longer than some 200 times the bound. What is sent of an entry that is scaled down leaves the
     vector in full: else the same entries would be the largest again and again.
@@ -110,37 +118,41 @@ class TopK:
     """
 
     def __init__(self, size: int) -> None:
-        self._count = max(round(TOP_SHARE * size), 1)
         self._magnitudes = np.empty(size, np.float32)
         # Odd: rows of weight matrices have even lengths, and each entry of a row its own scale.
         self._stride = size // _SAMPLE | 1
 
-    def take(self, vector: Tensor, largest: float) -> TopKGradient:
+    def take(self, vector: Tensor, largest: float, version: int) -> TopKGradient:
         """See `Codec.take`."""
         values = vector.numpy()
-        indices = self._largest(values)
+        indices = self._largest(values, max(round(share_at(version) * values.size), 1))
         chosen = torch.from_numpy(values[indices])
         clip_norm(chosen, largest / _BF16_ROUNDS_UP)
         halves = chosen.to(torch.bfloat16)
         values[indices] = (chosen - halves).numpy()
         return TopKGradient(values.size, indices.astype(np.uint32), _bits(halves))
 
-    def _largest(self, values: NDArray[np.float32]) -> NDArray[np.int64]:
-        """Return where the largest entries are, [k], ascending; the same for the same values."""
+    def _largest(self, values: NDArray[np.float32], count: int) -> NDArray[np.int64]:
+        """Return where the largest entries are, [count], ascending; the same for the same values."""
         magnitudes = np.abs(values, out=self._magnitudes)
         sample = np.sort(magnitudes[:: self._stride])
         # As many candidates as are wanted, and some for the error of the guess. A guess that was too high is halved
         # in rank: sorting all would take a second.
-        share = 1.25 * self._count / values.size
+        share = 1.25 * count / values.size
         while True:
             rank = sample.size - 1 - int(share * sample.size)
             least = sample[rank] if rank > 0 else np.float32(0.0)
             candidates = np.flatnonzero(magnitudes >= least)
-            if candidates.size >= self._count:
+            if candidates.size >= count:
                 break
             share *= 2.0
-        best = np.argpartition(magnitudes[candidates], -self._count)[-self._count :]
+        best = np.argpartition(magnitudes[candidates], -count)[-count:]
         return np.sort(candidates[best])
+
+
+def share_at(version: int) -> float:
+    """Return the share of the entries that `TopK` sends of a gradient that was computed on a version."""
+    return max(TOP_SHARE, FIRST_SHARE * 0.5 ** (version / HALVED_EVERY))
 
 
 def _bits(halves: Tensor) -> NDArray[np.uint16]:

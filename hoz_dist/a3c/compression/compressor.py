@@ -31,11 +31,12 @@ class Compressor:
         self._new_error = torch.zeros(rest)
         """What will be left once the last one is accepted."""
 
-    def compress(self, gradient: Vector) -> Gradient:
+    def compress(self, gradient: Vector, version: int) -> Gradient:
         """Return what is to be sent.
 
         Args:
             gradient: [P], finite, its norm within the bound; left as it is.
+            version: Version of the parameters that it was computed on: `TopK` sends more of the first ones.
 
         Returns:
             Valid until the next call; the gradient itself if it travels in full.
@@ -43,7 +44,7 @@ class Compressor:
         if self._codec is None:
             return gradient
         torch.add(self._error, borrowed(gradient), out=self._new_error)
-        return self._codec.take(self._new_error, self._largest)
+        return self._codec.take(self._new_error, self._largest, version)
 
     def accepted(self) -> None:
         """Say that the learner has accepted what was returned last."""

@@ -8,6 +8,8 @@ from hoz_dist.gradient_forms import Gradient, Vector
 
 SIZES = (1, 2, 255, 256, 257, 1000, 20_011)
 NO_BOUND = 1e30
+LATE = 10**9
+"""A version after all of the first ones."""
 
 
 def vector(seed: int, size: int = 20_011, norm: float = 1.0) -> Vector:

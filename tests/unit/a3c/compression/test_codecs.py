@@ -7,17 +7,18 @@ import pytest
 import torch
 from numpy.typing import NDArray
 
-from hoz_dist.a3c.compression.codecs import TOP_SHARE, Bf16, Codec, Int8, TopK
+from hoz_dist.a3c.compression.codecs import TOP_SHARE, Bf16, Codec, Int8, TopK, share_at
 from hoz_dist.gradient_forms import INT8_BLOCK, Gradient, Vector, blocks_of
-from tests.unit.a3c.compression.making import NO_BOUND, SIZES, left, received, vector
+from tests.unit.a3c.compression.making import LATE, NO_BOUND, SIZES, left, received, vector
 
 CODECS = (Bf16, Int8, TopK)
+VERSIONS = (0, 40, 80, 186, 10**9)
 
 
 def taken(codec: type[Bf16 | Int8 | TopK], values: Vector, largest: float = NO_BOUND) -> tuple[Gradient, Vector]:
     """Return what a codec sends, and what it leaves."""
     rest = torch.from_numpy(values.copy())
-    return codec(values.size).take(rest, largest), left(rest)
+    return codec(values.size).take(rest, largest, LATE), left(rest)
 
 
 def rounded_to_even(values: Vector) -> NDArray[np.uint16]:
@@ -125,7 +126,14 @@ def test_what_is_cut_off_does_not_stay(codec: type[Bf16 | Int8 | TopK]) -> None:
 @pytest.mark.parametrize("codec", CODECS)
 def test_the_same_is_made_of_the_same(codec: type[Bf16 | Int8 | TopK]) -> None:
     codecs: list[Codec] = [codec(20_011), codec(20_011)]
-    codecs[0].take(torch.from_numpy(vector(6)), 1.0)  # what came before leaves no trace in a codec
-    first, second = (one.take(torch.from_numpy(vector(7)), 1.0) for one in codecs)
+    codecs[0].take(torch.from_numpy(vector(6)), 1.0, LATE)  # what came before leaves no trace in a codec
+    first, second = (one.take(torch.from_numpy(vector(7)), 1.0, LATE) for one in codecs)
     for mine, theirs in zip(first, second, strict=True):
         np.testing.assert_array_equal(mine, theirs)
+
+
+def test_topk_sends_more_of_the_first_gradients() -> None:
+    sizes = [TopK(10_000).take(torch.from_numpy(vector(8, 10_000)), 1.0, version).indices.size for version in VERSIONS]
+    assert sizes == [2500, 1250, 625, 100, 100]
+    # All that is more takes no more entries than a dozen gradients in full.
+    assert sum(share_at(version) - TOP_SHARE for version in range(1000)) < 13

@@ -12,7 +12,7 @@ from hoz_dist.config import Compression
 from hoz_dist.gradient_forms import Vector
 from hoz_dist.wire.protocol.codec import encode
 from hoz_dist.wire.protocol.pushes import GradientPush
-from tests.unit.a3c.compression.making import NO_BOUND, received, vector
+from tests.unit.a3c.compression.making import LATE, NO_BOUND, received, vector
 
 LOSSY = tuple(name for name in get_args(Compression) if name != "fp32")
 SIZE = 2003
@@ -23,7 +23,7 @@ def sums(compression: Compression, gradients: list[Vector], largest: float = NO_
     compressor, decompressor = Compressor(compression, SIZE, largest), Decompressor(SIZE)
     sent = np.zeros(SIZE)
     for gradient in gradients:
-        sent += decompressor.vector(compressor.compress(gradient))
+        sent += decompressor.vector(compressor.compress(gradient, LATE))
         compressor.accepted()
     return sent.astype(np.float32), np.stack(gradients).sum(axis=0, dtype=np.float64).astype(np.float32)
 
@@ -63,23 +63,25 @@ def test_entries_that_were_cut_off_are_not_the_largest_for_ever() -> None:
 def test_a_refused_gradient_leaves_no_trace(compression: Compression) -> None:
     one, other = Compressor(compression, SIZE, NO_BOUND), Compressor(compression, SIZE, NO_BOUND)
     for compressor in (one, other):
-        compressor.compress(vector(1, SIZE))
+        compressor.compress(vector(1, SIZE), LATE)
         compressor.accepted()
-    one.compress(vector(2, SIZE))  # refused
-    np.testing.assert_array_equal(received(one.compress(vector(3, SIZE))), received(other.compress(vector(3, SIZE))))
+    one.compress(vector(2, SIZE), LATE)  # refused
+    np.testing.assert_array_equal(
+        received(one.compress(vector(3, SIZE), LATE)), received(other.compress(vector(3, SIZE), LATE))
+    )
 
 
 @pytest.mark.parametrize("compression", LOSSY)
 def test_the_gradient_of_an_actor_is_left_as_it_is(compression: Compression) -> None:
     gradient = vector(1, SIZE)
-    Compressor(compression, SIZE, 0.5).compress(gradient)
+    Compressor(compression, SIZE, 0.5).compress(gradient, LATE)
     np.testing.assert_array_equal(gradient, vector(1, SIZE))
 
 
 def test_a_gradient_in_full_is_itself() -> None:
     gradient = vector(1, SIZE)
     compressor = Compressor("fp32", SIZE, 1.0)
-    assert compressor.compress(gradient) is gradient
+    assert compressor.compress(gradient, LATE) is gradient
     compressor.accepted()
     assert Decompressor(SIZE).vector(gradient) is gradient
 
@@ -89,6 +91,6 @@ def test_fewer_bytes_travel(compression: Compression, times: float) -> None:
     size = 150_000
     full, short = (
         len(encode(GradientPush("actor-0", 2**48 - 1, 10**6, 3, 10**6, 1280, one)))
-        for one in (vector(0, size), Compressor(compression, size, 1.0).compress(vector(0, size)))
+        for one in (vector(0, size), Compressor(compression, size, 1.0).compress(vector(0, size), LATE))
     )
     assert full > times * short
