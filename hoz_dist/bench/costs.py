@@ -1,11 +1,14 @@
 """From what runs of one and two actors took to the costs that `hoz-dist simulate` computes with."""
 
+import math
+
 from hoz_dist.bench.report import this_machine
 from hoz_dist.bench.training import Measured, Window
 from hoz_dist.config import RunConfig
 from hoz_dist.policy.parameters import initial_parameters
 from hoz_dist.scaling.calibration import fitted
 from hoz_dist.scaling.costs import Costs
+from hoz_dist.wire.client.parameters import MOST_UNDER_WAY
 
 
 def measured_costs(config: RunConfig, one: Measured, two: Measured, cores: int, command: str) -> Costs:
@@ -49,7 +52,7 @@ def measured_costs(config: RunConfig, one: Measured, two: Measured, cores: int, 
         serve=learner("serve"),
         record=learner("record"),
         learner_wire=one.median(lambda window: _rest(window.learner) / window.updates),
-        round_trips=max(round(one.median(lambda window: window.of_learner("serve.count"))), 1),
+        round_trips=math.ceil(one.median(lambda window: window.of_learner("serve.count")) / MOST_UNDER_WAY),
     )
     return fitted(costs, cores, one.median(_speed), two.median(_speed))
 
