@@ -1,0 +1,101 @@
+"""How fast the policy learns with each gradient codec, in one process: actors take turns, each a few updates behind.
+
+python -m tests.campaigns.codecs --codec fp32 --codec topk --scene bathroom/1 --scene kitchen/1
+
+A minute or a few for each codec; whole runs over Zenoh, measured on rooms that they never saw, are those of
+`tests.campaigns.learning`.
+"""
+
+from collections import deque
+from collections.abc import Iterator, Sequence
+from typing import Final, NamedTuple, get_args
+
+import click
+import numpy as np
+import torch
+
+from hoz_dist.a3c.compression.compressor import Compressor
+from hoz_dist.a3c.compression.decompressor import Decompressor
+from hoz_dist.config import Compression, RunConfig
+from hoz_dist.evaluation.loading import matching_encoder
+from hoz_dist.gradient_forms import Vector
+from hoz_dist.nav.rooms import RoomId, training_rooms
+from hoz_dist.policy.parameters import initial_parameters
+from hoz_dist.sim.batch_env import BatchEnv
+from hoz_dist.sim.view_store import ViewStore, default_cache
+from learner.graph_store import GraphStore
+from learner.optimizer import FlatAdam, lag_weight
+from workers.collector import Collector
+from workers.preparation import RoomPreparation
+
+EPISODES: Final = 3000
+"""Last episodes whose success is told."""
+EVERY: Final = 100
+"""Updates between two lines."""
+
+
+class Line(NamedTuple):
+    """How far a training is."""
+
+    updates: int
+    success: float
+    """Share of the last episodes in training."""
+    left: float
+    """Norm of what the codec has left of the last gradient and all before."""
+
+
+def train(config: RunConfig, rooms: Sequence[RoomId], actors: int, updates: int) -> Iterator[Line]:
+    """Train; yields every so many updates."""
+    store, encoder = ViewStore(default_cache(), config.picture_size), matching_encoder(config, None)
+    preparation = RoomPreparation(rooms, store, encoder, zones=config.zones, actor="codecs")
+    ready = [preparation.next() for _ in rooms]
+    graphs = GraphStore(config.zones, {})
+    for room in ready:
+        graphs.add(room.graph)
+    adam = FlatAdam(initial_parameters(config.policy, config.seed), config.learning_rate)
+    decompressor = Decompressor(adam.size)
+    collectors, compressors, errors = [], [], [np.zeros(adam.size, np.float32) for _ in range(actors)]
+    for number in range(actors):
+        rng = np.random.default_rng([config.seed, number])
+        env = BatchEnv(config.batch, rng)
+        for room in ready:
+            env.add_room(room.views)
+        collectors.append(Collector(config, env, rng))
+        for graph in graphs.scenes.values():
+            collectors[-1].use_graph(graph)
+        compressors.append(Compressor(config.compress, adam.size, config.gradient_norm))
+    waiting: deque[tuple[int, int, Vector]] = deque()
+    ended: deque[bool] = deque(maxlen=EPISODES)
+    for update in range(updates):
+        if len(waiting) == actors:
+            actor, version, gradient = waiting.popleft()
+            vector = decompressor.vector(compressors[actor].compress(gradient, version))
+            compressors[actor].accepted()
+            errors[actor] += gradient - vector
+            adam.set_progress(update / updates)
+            adam.step(vector, lag_weight(actors - 1))
+        actor = update % actors
+        collectors[actor].parameters.load(adam.parameters)
+        rollout = collectors[actor].roll_out()
+        waiting.append((actor, max(update - actors, 0), rollout.gradient.copy()))
+        ended += [result.success for result in rollout.finished]
+        if (update + 1) % EVERY == 0:
+            yield Line(update + 1, float(np.mean(ended)), float(np.linalg.norm(errors[actor])))
+
+
+@click.command()
+@click.option("--codec", "codecs", multiple=True, type=click.Choice(get_args(Compression)), default=("fp32", "topk"))
+@click.option("--seed", type=int, default=0, show_default=True)
+@click.option("--updates", type=int, default=600, show_default=True)
+@click.option("--actors", type=int, default=2, show_default=True)
+@click.option("--scene", "scenes", multiple=True, default=("bathroom",), show_default=True)
+def main(codecs: tuple[Compression, ...], seed: int, updates: int, actors: int, scenes: tuple[str, ...]) -> None:
+    """Train with each codec, and print success as it grows."""
+    torch.set_num_threads(1)
+    for codec in codecs:
+        for line in train(RunConfig(seed=seed, compress=codec), training_rooms(scenes), actors, updates):
+            click.echo(f"{codec}  {line.updates} updates  success {line.success:.3f}  left {line.left:.2f}")
+
+
+if __name__ == "__main__":
+    main()
