@@ -5,6 +5,7 @@ next gradient. The learner refuses gradients whose norm is above the run's bound
 never is: it is scaled down, and what that cuts off is lost, as it is without a codec.
 """
 
+import math
 from typing import Final, Protocol
 
 import numpy as np
@@ -152,7 +153,7 @@ class TopK:
 
 def share_at(version: int) -> float:
     """Return the share of the entries that `TopK` sends of a gradient that was computed on a version."""
-    return max(TOP_SHARE, FIRST_SHARE * 0.5 ** (version / HALVED_EVERY))
+    return max(TOP_SHARE, FIRST_SHARE * math.exp2(-version / HALVED_EVERY))
 
 
 def _bits(halves: Tensor) -> NDArray[np.uint16]:
