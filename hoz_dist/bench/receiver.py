@@ -30,7 +30,7 @@ def receive(
     ready: Callable[[], None],
     stopped: Callable[[float], bool],
 ) -> None:
-    """Accept pushes and serve parameters until told to stop.
+    """Accept pushes and serve parameters until told to stop; the first push changes the parameters.
 
     Args:
         endpoint: Where to listen.
@@ -47,7 +47,9 @@ def receive(
         ParametersPublisher(session, KEYS, memory=memory) as publisher,
         BareReplies(session, encode(accepted)),
     ):
-        publisher.publish(EPOCH, 0, np.ones(parameters, dtype=np.float32))
+        vector = np.random.default_rng(0).standard_normal(parameters, dtype=np.float32)
+        publisher.publish(EPOCH, 0, vector)
+        version = 0
         snapshots = Snapshots(_config_reply(config.to_json()), _no_status, config.edge_cost)
         with Server(session, KEYS, snapshots, parameters=parameters) as server:
             ready()
@@ -55,6 +57,10 @@ def receive(
                 request = server.inbox.take(TICK_S)
                 if request is not None:
                     request.answer(accepted)
+                    if version == 0:
+                        # Who has fetched the first version before it pushed gets later ones as a difference to it.
+                        version = 1
+                        publisher.publish(EPOCH, version, vector * np.float32(1.001))
 
 
 def _config_reply(config: Mapping[str, Any]) -> ConfigReply:
