@@ -49,7 +49,7 @@ class FlatParameters:
 
     def _views(self, flat: Tensor) -> Iterator[Tensor]:
         """Return the part of a flat vector [P] that belongs to each parameter, in its shape."""
-        parts = flat.split([parameter.numel() for parameter in self._parameters])
+        parts = torch.split(flat, [parameter.numel() for parameter in self._parameters])
         return (part.view_as(parameter) for part, parameter in zip(parts, self._parameters, strict=True))
 
     def load(self, vector: NDArray[np.float32]) -> None:

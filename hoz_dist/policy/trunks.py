@@ -83,7 +83,7 @@ class GridTrunk(nn.Module):
         # The pointwise convolution of all maps on top of each other, but part by part: the context is the same in
         # every cell, so its share is computed once, and nothing is copied together.
         widths = [picture.shape[2], context.shape[1]] + ([picture.shape[2]] if objects is not None else [])
-        weights = self.join.weight.split(widths, dim=1)
+        weights = torch.split(self.join.weight, widths, dim=1)
         joined = picture @ weights[0].t() + functional.linear(context, weights[1], self.join.bias).unsqueeze(1)
         if objects is not None:
             joined = joined + functional.relu(self.objects(objects)) @ weights[2].t()

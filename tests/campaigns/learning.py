@@ -164,7 +164,7 @@ def main(folder: Path, ways: tuple[str, ...], seeds: int, frames: int, actors: i
             values = json.loads(result.read_text(encoding="utf-8"))
             curves.setdefault(way, {})[seed] = Curve(tuple(values["frames"]), tuple(values["success"]))
             click.echo(f"{way}, seed {seed}: {curves[way][seed].end:.1f}")
-    results = {
+    results: dict[str, Any] = {
         "command": f"python -m tests.campaigns.learning --seeds {seeds} --frames {frames} --actors {actors} "
         f"--episodes {episodes}",
         "ways": compare(curves),
