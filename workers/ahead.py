@@ -4,9 +4,12 @@ import threading
 from collections.abc import Callable
 from concurrent.futures import Future
 from queue import SimpleQueue
-from typing import Generic, TypeVar
+from typing import Final, Generic, TypeVar
 
 from hoz_dist.closing import Closing
+
+CLOSE_S: Final = 5.0
+"""How long work that is under way may take to end; pushes end at once when their process is to stop, seconds."""
 
 T = TypeVar("T")
 
@@ -40,8 +43,10 @@ class Ahead(Closing, Generic[T]):
         return None if future is None else future.result()
 
     def close(self) -> None:
-        """Begin nothing more; what is under way is not waited for."""
+        """Begin nothing more, and wait a moment for what is under way: what it works with may be closed next."""
         self._tasks.put(None)
+        if self._thread.ident is not None:
+            self._thread.join(CLOSE_S)
 
     def _run(self) -> None:
         while (task := self._tasks.get()) is not None:
