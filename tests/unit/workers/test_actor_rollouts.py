@@ -9,6 +9,7 @@ import pytest
 
 from hoz_dist.errors import HozError
 from hoz_dist.policy.parameters import initial_parameters
+from hoz_dist.waiting import StoppedError
 from hoz_dist.wire.protocol.answers import Accepted, Refused
 from hoz_dist.wire.protocol.graphs import scene_graph_reply
 from hoz_dist.wire.protocol.rejection import Reason
@@ -46,6 +47,8 @@ class FakeLearner:
     def push_trajectory(
         self, steps: Any, rooms: Any, graphs: tuple[GraphUsed, ...], stamp: tuple[int, int]
     ) -> Accepted | Refused:
+        if self._stop.is_set():
+            raise StoppedError  # as a push does
         assert [used.room for used in rooms] == [KITCHEN]
         assert steps.action.shape == (ROLLOUTS.rollout_steps, ROLLOUTS.batch)
         self.pushed.append(stamp)
