@@ -14,6 +14,7 @@ from hoz_dist.cli.bench_options import benchmark_options, show_metrics
 from hoz_dist.cli.options import cache_option
 from hoz_dist.cli.ports import free_endpoint
 from hoz_dist.errors import HozError
+from hoz_dist.nav.rooms import RoomId
 
 if TYPE_CHECKING:
     from hoz_dist.cli.processes import Children
@@ -65,7 +66,9 @@ def query_command(
     from hoz_dist.cli.apart import companion, work_apart
 
     with _learner(connect, actors if training else 0, cache) as endpoint:
-        scene, bare = scene_with_graph(endpoint), free_endpoint()
+        # What a learner tells of its scenes is half a second old; that of ours is known.
+        scene = RoomId.parse(_ROOM).scene if connect is None else scene_with_graph(endpoint)
+        bare = free_endpoint()
         with companion(partial(answer_bare, bare, graph_bytes(scene, endpoint))):
             work = partial(
                 bench_query,
@@ -92,7 +95,6 @@ def _learner(connect: str | None, actors: int, cache: Path | None) -> Iterator[s
     from hoz_dist.cli import launch
     from hoz_dist.cli.processes import Children
     from hoz_dist.cli.run_options import as_arguments
-    from hoz_dist.nav.rooms import RoomId
 
     endpoint = free_endpoint()
     with tempfile.TemporaryDirectory(prefix="hoz-dist-") as logs, Children() as children:
