@@ -6,12 +6,14 @@ from typing import Any, Final
 
 import simpy
 
-from hoz_dist.scaling.node import Answer, Node, Push
+from hoz_dist.scaling.node import Answer, Node, Process, Push
 from hoz_dist.scaling.sharing import Shared
 from hoz_dist.waiting import FIRST_PAUSE_S, FIRST_TRY_S, LONGER_TRIES, LONGEST_PAUSE_S
 
+UNDER_WAY: Final = 2
+"""Questions of a fetch that are under way at once: while one part is taken in, the next is served."""
 MOST_STEPS: Final = 4
-"""A fetch of many questions is simulated as so many, each of several."""
+"""A fetch of many questions after each other is simulated as so many, each of several."""
 
 
 class Client:
@@ -27,6 +29,8 @@ class Client:
         self._node = node
         self._host = host
         self._rng = rng
+        self._thread = simpy.Resource(node.env)
+        """Takes parameters in."""
 
     def push(self, push: Push) -> Generator[simpy.Event, Any, Answer]:
         """Push until it is accepted or refused."""
@@ -35,7 +39,7 @@ class Client:
         yield self._host.use(costs.push)
         pause, patience = FIRST_PAUSE_S, FIRST_TRY_S
         while True:
-            yield self._host.use(wire)
+            self._host.use(wire)  # by other threads, while this one goes on to wait
             reply = node.send(push, costs.bytes_up)
             yield reply | env.timeout(patience)
             answer: Answer | None = reply.value if reply.triggered else None
@@ -50,19 +54,28 @@ class Client:
     def fetch(self) -> Generator[simpy.Event, Any, int]:
         """Fetch the newest parameters; returns their version."""
         node, costs, env = self._node, self._node.costs, self._node.env
-        wire = costs.actor_wire * costs.bytes_down / (costs.bytes_up + costs.bytes_down)
         pause = FIRST_PAUSE_S
         while (version := node.begin(self)) is None:
             yield env.timeout(2.0 * node.latency + costs.exchange)
             yield from self._pause(pause)
             pause = min(2.0 * pause, LONGEST_PAUSE_S)
-        steps = min(costs.round_trips, MOST_STEPS)
-        for _ in range(steps):
-            yield env.timeout(costs.round_trips / steps * (2.0 * node.latency + costs.exchange))
-            yield from node.serve(costs.bytes_down / steps, 1.0 / steps)
-            yield self._host.use((costs.fetch + wire) / steps)
+        self._host.use(costs.actor_wire * costs.bytes_down / (costs.bytes_up + costs.bytes_down))
+        lanes = UNDER_WAY if costs.round_trips > 1 else 1
+        yield env.all_of([env.process(self._read(lanes)) for _ in range(lanes)])
         node.end(self)
         return version
+
+    def _read(self, lanes: int) -> Process:
+        """Ask for a share of the parameters, part by part."""
+        node, costs, env = self._node, self._node.costs, self._node.env
+        steps = min(costs.round_trips, MOST_STEPS)
+        share = 1.0 / (steps * lanes)
+        for _ in range(steps):
+            yield env.timeout(costs.round_trips / steps * (2.0 * node.latency + costs.exchange))
+            yield from node.serve(share)
+            with self._thread.request() as turn:
+                yield turn
+                yield self._host.use(share * costs.fetch)
 
     def _pause(self, longest: float) -> Generator[simpy.Event, Any, None]:
         yield self._node.env.timeout(self._rng.uniform(longest / 2.0, longest))

@@ -74,7 +74,7 @@ class Costs:
     """Share of the time of the learner's Python threads in which they hold the interpreter lock."""
     # --- the wire ---
     round_trips: int = 1
-    """Questions and answers, one after the other, with which parameters are fetched."""
+    """Questions and answers that follow each other when parameters are fetched."""
     exchange: float = 0.0
     """Time that a question and its answer take beside all that computes, seconds; fitted to a run of one actor."""
     crowding: float = 0.0

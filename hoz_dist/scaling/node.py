@@ -162,15 +162,15 @@ class Node:
         self._reading[reader] = self.version
         return self.version
 
-    def serve(self, size: float, share: float) -> Process:
-        """Answer a reader with ``size`` bytes, which are a ``share`` of the parameters."""
+    def serve(self, share: float) -> Process:
+        """Answer a reader with a share of the parameters."""
         with self._serving.request() as turn:
             yield turn
             began = self.env.now
             yield from self._compute(share * self.costs.serve)
             self.serve_used += self.env.now - began
-        yield self.host.use(share * self._wire_down)
-        yield self.link.down.use(self.link.seconds(size))
+        self.host.use(share * self._wire_down)  # by other threads; nobody waits for all of it
+        yield self.link.down.use(self.link.seconds(share * self.costs.bytes_down))
 
     def end(self, reader: object) -> None:
         """End to read."""
@@ -187,7 +187,7 @@ class Node:
         while True:
             request: Request = yield self._channel.get()
             began = self.env.now
-            yield self.host.use(self._wire_up)
+            self.host.use(self._wire_up)  # by other threads
             yield from self._compute(self.costs.receive)
             self.receive_used += self.env.now - began
             waiting = len(self._inbox.items)

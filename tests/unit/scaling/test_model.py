@@ -13,22 +13,34 @@ ALL = {
     "load": 0.01,
     "push": 0.02,
     "fetch": 0.03,
-    "actor_wire": 0.04,
     "receive": 0.05,
     "apply": 0.06,
     "publish": 0.07,
     "serve": 0.08,
     "record": 0.0,  # while the actor goes on
-    "learner_wire": 0.08,
 }
 
 
 def test_one_actor_alone_takes_the_sum_of_all_costs_and_delays() -> None:
-    found = simulate(costs(**ALL, round_trips=3, exchange=0.1), setting(latency=0.05))
-    # Four questions: a push and three fetches.
-    assert 1.0 / found.updates_per_second == pytest.approx(sum(ALL.values()) + 4 * (0.1 + 2 * 0.05))
+    found = simulate(costs(**ALL, exchange=0.1), setting(latency=0.05))
+    # Two questions: a push and a fetch.
+    assert 1.0 / found.updates_per_second == pytest.approx(sum(ALL.values()) + 2 * (0.1 + 2 * 0.05))
     assert found.frames_per_second == pytest.approx(100 * found.updates_per_second)
     assert (found.lag, found.stale, found.busy, found.resent) == (0.0, 0.0, 0.0, 0.0)
+
+
+def test_a_part_of_the_parameters_is_taken_in_while_the_next_is_served() -> None:
+    found = simulate(costs(act=1.0, serve=0.4, fetch=0.4, round_trips=2), setting())
+    # Two lanes of two parts, 0.1 s to serve and to take in: five of those times instead of eight.
+    assert 1.0 / found.updates_per_second == pytest.approx(1.5)
+    slow = simulate(costs(act=1.0, round_trips=50), setting(latency=0.01))
+    assert 1.0 / slow.updates_per_second == pytest.approx(1.0 + 51 * 0.02)
+
+
+def test_zenohs_threads_take_cores_but_nobody_waits_for_them() -> None:
+    busy = costs(act=1.0, actor_wire=0.5, learner_wire=0.5)
+    assert simulate(busy, setting(one_host=True, cores=8)).updates_per_second == pytest.approx(1.0)
+    assert simulate(busy, setting(one_host=True, cores=1)).updates_per_second == pytest.approx(0.5, rel=0.1)
 
 
 def test_the_interpreter_lock_alone_does_not_slow_one_actor_down() -> None:
