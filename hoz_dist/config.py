@@ -120,13 +120,16 @@ class RunConfig:
         """Read a configuration.
 
         Args:
-            values: What `to_json` returned, perhaps by way of a file or the network.
+            values: What `to_json` returned, perhaps by way of a file or the network; of an older run, fields that there
+                were not yet have their defaults, which is how it was then.
 
         Raises:
             InvalidValueError: A field is missing, unknown, of the wrong type or out of range.
             UnknownNameError: A value of a field with named values does not exist.
         """
         known = {field.name: field for field in fields(cls)}
+        if isinstance(values, dict):
+            values = {name: known[name].default for name in _LATER} | values
         if not isinstance(values, dict) or set(values) != set(known):
             given = set(values) if isinstance(values, dict) else set()
             wrong = sorted(str(name) for name in given ^ set(known))
@@ -158,6 +161,8 @@ def _fits(name: str, value: object, default: object) -> bool:
     return type(value) is type(default) or (type(default) is float and type(value) is int)
 
 
+_LATER: Final = ("precision", "learn_from", "compress", "parameters")
+"""Fields that the first run folders do not have."""
 _RANGES: Final = (
     ("channels", 1, 4096),
     ("picture_size", 16, 512),

@@ -243,5 +243,5 @@ class ActorCritic(nn.Module):
 
 
 def _products_in(dtype: torch.dtype) -> torch.autocast:
-    """Compute products, and what follows from them element by element, in a type."""
+    """Have products, and what follows from them element by element, in a type, for as long as the context lasts."""
     return torch.autocast("cpu", dtype, enabled=dtype != torch.float32)

@@ -7,7 +7,8 @@ Method = Literal["a3c", "object", "hoz"]
 Preset = Literal["compact", "paper"]
 EncoderName = Literal["pooled", "resnet18"]
 Precision = Literal["fp32", "bf16"]
-"""Of the factors of matrix products; sums, activations and parameters are always fp32."""
+"""Of the products over rollouts, most of the arithmetic: their factors and results, and the maps of the trunk.
+Parameters, cells, activations of the LSTM, heads and loss are always fp32; sums within a product are, too."""
 Layer = Literal["object", "scene", "zone", "done"]
 """Layers that can be switched off: object, scene and zone layer, done reminder."""
 

@@ -144,7 +144,7 @@ class Tape:
 
 
 def add_product(total: Tensor, left: Tensor, right: Tensor) -> Tensor:
-    """Add the product of two factors of one type to fp32 sums, in place; return the sums."""
+    """Add the product of two factors of one type, which is rounded to that type, to fp32 totals; return the totals."""
     if left.dtype == total.dtype:
         return total.addmm_(left, right)
     return total.add_(torch.mm(left, right))

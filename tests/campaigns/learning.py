@@ -36,6 +36,7 @@ WAYS: Final[Mapping[str, tuple[str, ...]]] = {
     "topk": ("--compress", "topk"),
     "delta": ("--parameters", "delta"),
     "rollouts": ("--learn-from", "rollouts"),
+    "products": ("--precision", "bf16"),
 }
 """Options of each way of training; the first is what the others are compared with."""
 CHECKPOINTS: Final = 20
@@ -150,7 +151,9 @@ def main(folder: Path, ways: tuple[str, ...], seeds: int, frames: int, actors: i
     """Train in every way with every seed, measure, and write results.json and curves.png."""
     torch.set_num_threads(1)
     folder.mkdir(parents=True, exist_ok=True)
-    chosen = [way for way in WAYS if way in (ways or WAYS)]
+    reference = next(iter(WAYS))
+    chosen = [way for way in WAYS if way in (ways or WAYS) or way == reference]
+    settings = {"frames": frames, "actors": actors, "episodes": episodes}
     curves: dict[str, dict[int, Curve]] = {}
     # Seed by seed, so that whenever this is interrupted the ways have seen the same seeds.
     for seed in range(seeds):
@@ -160,8 +163,12 @@ def main(folder: Path, ways: tuple[str, ...], seeds: int, frames: int, actors: i
             if not result.exists():
                 train(run, WAYS[way], seed, frames, actors)
                 curve = measure(run, episodes)
-                result.write_text(json.dumps({"frames": curve.frames, "success": curve.success}), encoding="utf-8")
+                measured = {"settings": settings, "frames": curve.frames, "success": curve.success}
+                result.write_text(json.dumps(measured), encoding="utf-8")
             values = json.loads(result.read_text(encoding="utf-8"))
+            if values["settings"] != settings:
+                message = f"{result} is of other settings ({values['settings']}); give another --folder."
+                raise click.UsageError(message)
             curves.setdefault(way, {})[seed] = Curve(tuple(values["frames"]), tuple(values["success"]))
             click.echo(f"{way}, seed {seed}: {curves[way][seed].end:.1f}")
     results: dict[str, Any] = {

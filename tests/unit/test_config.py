@@ -41,6 +41,16 @@ def test_what_is_no_configuration_is_refused(values: object) -> None:
         RunConfig.from_json(values)
 
 
+def test_a_run_from_before_there_was_a_choice_is_what_was_done_then() -> None:
+    values = RunConfig(preset="paper", seed=3).to_json()
+    for later in ("precision", "learn_from", "compress", "parameters"):
+        del values[later]
+    assert RunConfig.from_json(values) == RunConfig(preset="paper", seed=3)
+    del values["method"]
+    with pytest.raises(HozError, match="missing or unknown: method"):
+        RunConfig.from_json(values)
+
+
 def test_differences_are_named_with_both_values() -> None:
     assert RunConfig(seed=1).differences(RunConfig(seed=2)) == ["seed: 1, 2"]
     assert RunConfig().differences(RunConfig()) == []

@@ -2,6 +2,7 @@ import torch
 from torch import Tensor, nn
 
 from hoz_dist.policy.recurrent import EpisodicLSTM
+from hoz_dist.policy.tape import Tape
 
 CELLS, INPUTS, LAYERS = 4, 5, 2
 
@@ -106,3 +107,24 @@ def test_gradients_are_those_of_torchs_lstm_with_resets() -> None:
             assert parameter.grad is not None
             expected_gradient = reference.get_parameter(f"{name}_l{layer}").grad
             torch.testing.assert_close(torch_order(parameter.grad), expected_gradient)
+
+
+def test_a_tape_of_lower_precision_takes_the_weights_as_they_are_when_it_is_rewound() -> None:
+    lstm = make(4)
+    low, full = Tape(5, 3, CELLS, LAYERS, torch.bfloat16), lstm.tape(5, 3)
+    inputs, first, state = torch.randn(5, 3, INPUTS), torch.zeros(5, 3, dtype=torch.bool), lstm.initial_state(3)
+    for factor in (1.0, -2.0):
+        with torch.no_grad():
+            for parameter in lstm.parameters():
+                parameter.mul_(factor)
+        gradients = []
+        for tape in (low, full):
+            tape.rewind()
+            lstm.record(inputs, first, state, tape)
+            lstm.zero_grad()
+            outputs = lstm.differentiable(inputs, tape)
+            outputs.sum().backward()  # type: ignore[no-untyped-call]
+            gradients.append(torch.cat([parameter.grad.flatten() for parameter in lstm.parameters()]))  # type: ignore[union-attr]
+        assert (gradients[0] - gradients[1]).norm() < 0.03 * gradients[1].norm()
+        assert not torch.equal(gradients[0], gradients[1])
+        torch.testing.assert_close(low.layers[-1].outputs, full.layers[-1].outputs, atol=0.03, rtol=0.03)
