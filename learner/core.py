@@ -13,6 +13,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final
 
 from hoz_dist.a3c.compression.decompressor import Decompressor
+from hoz_dist.a3c.norm import gradient_norm
 from hoz_dist.config import RunConfig
 from hoz_dist.errors import InvalidValueError
 from hoz_dist.gradient_forms import Vector
@@ -46,7 +47,7 @@ from learner.events import (
     TrajectoryReceived,
 )
 from learner.graph_store import GraphStore
-from learner.optimizer import NORM_TOLERANCE, FlatAdam, gradient_norm, lag_weight
+from learner.optimizer import NORM_TOLERANCE, FlatAdam, lag_weight
 from learner.replay import Schedule, UpdateRecord
 from learner.rollout_gradients import Learnt, RolloutGradients
 from learner.statistics import Statistics
@@ -223,14 +224,14 @@ class LearnerCore:
         if refusal is not None:
             yield self._refuse(request, *refusal)
             return
+        if self._schedule is not None and self._schedule.turn(push.actor, push.sequence) == "later":
+            yield Reply(request, Busy(self.epoch))
+            return
         vector = self._decompressor.vector(push.gradient)
         norm, bound = gradient_norm(vector), self.config.gradient_norm
         # Actors scale their gradients down; what exceeds the bound by more than rounding is not one of theirs.
         if norm > bound * (1.0 + NORM_TOLERANCE):
             yield self._refuse(request, Reason.NORM, f"norm {norm:.6g}, the bound is {bound:g}")
-            return
-        if self._schedule is not None and self._schedule.turn(push.actor, push.sequence) == "later":
-            yield Reply(request, Busy(self.epoch))
             return
         weight = lag_weight(self.version - push.version)
         yield from self._apply(sender, push, Learnt(vector, push.frames), weight, now)

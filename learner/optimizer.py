@@ -35,19 +35,6 @@ def lag_weight(lag: int) -> float:
     return float(1.0 / np.sqrt(1.0 + lag))
 
 
-def gradient_norm(gradient: Vector) -> float:
-    """Return the Euclidean norm of finite entries.
-
-    One pass in float32, about a tenth of the cost of the Adam step that follows. Entries beyond 1e19 overflow there and
-    take a second pass in float64.
-    """
-    with np.errstate(over="ignore", invalid="ignore"):
-        squared = float(np.dot(gradient, gradient))
-        if not np.isfinite(squared):
-            return float(np.linalg.norm(gradient.astype(np.float64)))
-    return float(np.sqrt(squared))
-
-
 class FlatAdam:
     """Adam (fused: one pass over memory) that owns the parameters.
 

@@ -17,6 +17,7 @@ from torch import Tensor
 
 from hoz_dist.a3c.differentiation import Behaviour, Differentiator
 from hoz_dist.a3c.loss import Loss
+from hoz_dist.a3c.norm import gradient_norm
 from hoz_dist.config import RunConfig
 from hoz_dist.gradient_forms import Vector
 from hoz_dist.graph.scene_graph import SceneGraph
@@ -32,7 +33,6 @@ from hoz_dist.sim.row_table import RowTable
 from hoz_dist.sim.view_source import StoredViews
 from hoz_dist.wire.protocol.rejection import Reason, RejectedError
 from hoz_dist.wire.protocol.trajectories import Flag, GraphUsed, Steps, TrajectoryPush
-from learner.optimizer import gradient_norm
 from learner.rollout_states import Ended, RolloutStates
 
 GRAPH_VERSIONS: Final = 64

@@ -1,11 +1,37 @@
-"""Bounding the length of gradients."""
+"""The length of gradients: actors bound it, and the learner checks that they did, with the same function."""
 
-import torch
+from typing import Final
+
+import numpy as np
 from torch import Tensor
+
+from hoz_dist.gradient_forms import Vector
+
+_PIECE: Final = 32 * 1024
+"""Entries whose squares are summed in float32; the sums of pieces are added in float64."""
+
+
+def gradient_norm(gradient: Vector) -> float:
+    """Return the Euclidean norm of a gradient [P], off by less than a millionth of itself.
+
+    One pass in float32, about a tenth of the cost of an Adam step. It goes piece by piece: one sum over ten million
+    entries loses the small ones behind the large ones, up to 0.3% when those come first. A piece with entries beyond
+    1e19, whose squares overflow, takes a second pass in float64. NaN or infinite when an entry is.
+    """
+    squared = 0.0
+    with np.errstate(over="ignore", invalid="ignore"):
+        for start in range(0, gradient.size, _PIECE):
+            piece = gradient[start : start + _PIECE]
+            in_piece = float(np.dot(piece, piece))
+            if not np.isfinite(in_piece):
+                exact = piece.astype(np.float64)
+                in_piece = float(np.dot(exact, exact))
+            squared += in_piece
+    return float(np.sqrt(squared))
 
 
 def clip_norm(gradient: Tensor, largest: float) -> None:
-    """Scale a gradient down in place if its Euclidean norm is above ``largest``."""
-    norm = float(torch.linalg.vector_norm(gradient))
+    """Scale a gradient [P], in main memory, down in place if its Euclidean norm is above ``largest``."""
+    norm = gradient_norm(gradient.numpy())
     if norm > largest:
         gradient.mul_(largest / norm)

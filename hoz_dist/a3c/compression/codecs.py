@@ -13,7 +13,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from hoz_dist.a3c.norm import clip_norm
+from hoz_dist.a3c.norm import clip_norm, gradient_norm
 from hoz_dist.gradient_forms import INT8_BLOCK, Bf16Gradient, Gradient, Int8Gradient, TopKGradient, blocks_of
 
 TOP_SHARE: Final = 0.01
@@ -96,7 +96,7 @@ class Int8:
             levels.copy_(values)
             values.mul_(scales)
         # Rounding may have made it longer.
-        norm = float(torch.linalg.vector_norm(sent))
+        norm = gradient_norm(sent.numpy())
         if norm > largest:
             self._scales.mul_(largest / norm)
             sent.mul_(largest / norm)

@@ -6,7 +6,6 @@ import pytest
 import torch
 
 from hoz_dist.a3c.differentiation import Behaviour, Differentiator
-from hoz_dist.a3c.norm import clip_norm
 from hoz_dist.a3c.rollout import Rollout
 from hoz_dist.config import RunConfig
 from hoz_dist.nav.observation import Observation
@@ -89,11 +88,3 @@ def test_a_rollout_of_which_nothing_is_learnt_still_has_a_gradient() -> None:
     nothing = acted.behaviour._replace(valid=torch.zeros(STEPS, BATCH, dtype=torch.bool))
     found, _ = acted.off_policy(nothing)
     torch.testing.assert_close(found, torch.zeros_like(found))
-
-
-def test_clipping_scales_only_what_is_too_long() -> None:
-    long, short = torch.tensor([3.0, 4.0]), torch.tensor([0.3, 0.4])
-    clip_norm(long, 1.0)
-    clip_norm(short, 1.0)
-    torch.testing.assert_close(long, torch.tensor([0.6, 0.8]))
-    torch.testing.assert_close(short, torch.tensor([0.3, 0.4]))
