@@ -222,13 +222,15 @@ def _known(before: Tensor, steps: Steps) -> Tensor:
 
 def _behaviour(steps: Steps, known: Tensor) -> Behaviour:
     """Return what the actor did; what the state is not known at is not learnt from."""
+    valid = torch.from_numpy(steps.has(Flag.VALID)[:-1])
     return Behaviour(
         actions=_long(steps.action),
         rewards=torch.from_numpy(steps.reward.copy()),
         terminated=torch.from_numpy(steps.has(Flag.TERMINATED)[:-1]),
         truncated=torch.from_numpy(steps.has(Flag.TRUNCATED)[:-1]),
-        valid=torch.from_numpy(steps.has(Flag.VALID)[:-1]) & known,
+        valid=valid & known,
         log_probabilities=torch.from_numpy(steps.log_probability.copy()),
+        taken=int(valid.sum()),
     )
 
 

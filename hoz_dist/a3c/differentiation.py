@@ -33,6 +33,8 @@ class Behaviour(NamedTuple):
     """Whether the action was taken, and is to be learnt from, bool [T, B]."""
     log_probabilities: Tensor
     """Log-probabilities of the actions under that policy, float32 [T, B]."""
+    taken: int | None = None
+    """Number of actions taken; see `Rollout`."""
 
 
 class Differentiator:
@@ -98,17 +100,14 @@ class Differentiator:
         guided, guided_after = (Guidance._make(part[rows] for part in guidance) for rows in _split(steps))
         self._tape.rewind()
         unrolled = self._policy.unroll(seen, start, guided, bank, self._tape)
+        # One step is taken in full precision, as an actor takes it: copying the weights would cost more than it saves.
+        step = self._policy.lstm.tape(1, behaviour.actions.shape[1])
         with torch.no_grad():
-            bootstrap = self._policy.unroll(after, unrolled.state, guided_after, bank).values[0]
+            bootstrap = self._policy.unroll(after, unrolled.state, guided_after, bank, step).values[0]
         rollout = Rollout(
-            actions=behaviour.actions,
-            rewards=behaviour.rewards,
-            terminated=behaviour.terminated,
-            truncated=behaviour.truncated,
-            valid=behaviour.valid,
+            **behaviour._asdict(),
             values=unrolled.values.detach(),
             bootstrap=bootstrap,
-            log_probabilities=behaviour.log_probabilities,
         )
         return self._descend(rollout, unrolled, seen), unrolled.state
 

@@ -8,7 +8,7 @@ from torch.nn import functional
 
 from hoz_dist.a3c.returns import generalized_advantages
 from hoz_dist.a3c.rollout import Rollout
-from hoz_dist.a3c.vtrace import vtrace_advantages
+from hoz_dist.a3c.vtrace import vtrace
 
 ADVANTAGE_FLOOR = 0.05
 """Least scale by which advantages are divided, so that noise is not blown up when nothing differs."""
@@ -51,12 +51,13 @@ def a3c_loss(
     scene_logits: Tensor | None = None,
     scenes: Tensor | None = None,
 ) -> Loss:
-    """Compute the loss of a rollout, averaged over its valid steps.
+    """Compute the loss of a rollout, averaged over the actions taken.
 
     Advantages are divided by their standard deviation in the rollout: success comes rarely at first and often later,
     and the entropy bonus keeps its meaning against either.
 
-    A rollout that another policy acted is corrected by V-trace.
+    A rollout that another policy acted is corrected by V-trace. Its ratios come after the division, which would
+    otherwise give back what they take from a rollout that this policy would hardly have acted.
 
     Args:
         rollout: T steps of B episodes.
@@ -67,17 +68,19 @@ def a3c_loss(
         scenes: True scenes, int64 [T, B], the labels of `scene_logits`.
     """
     valid = rollout.valid.float()
-    count = valid.sum().clamp(min=1.0)
+    count = max(rollout.frames if rollout.taken is None else rollout.taken, 1)
     log_probabilities = functional.log_softmax(logits, dim=-1)
     chosen = log_probabilities.gather(-1, rollout.actions.unsqueeze(-1)).squeeze(-1)
     if rollout.log_probabilities is None:
         advantages, returns = generalized_advantages(rollout, weights.discount, weights.gae_lambda)
+        counting = valid
     else:
-        advantages, returns = vtrace_advantages(rollout, chosen.detach(), weights.discount, weights.gae_lambda)
+        ratios, advantages, returns = vtrace(rollout, chosen.detach(), weights.discount, weights.gae_lambda)
+        counting = ratios * valid
     learnt = advantages[rollout.valid] if rollout.valid.any() else advantages.new_zeros(1)
     scale = learnt.std(correction=0).clamp(min=ADVANTAGE_FLOOR)
 
-    policy = -(chosen * (advantages / scale) * valid).sum() / count
+    policy = -(chosen * (advantages / scale) * counting).sum() / count
     value = 0.5 * ((values - returns).square() * valid).sum() / count
     entropy = -((log_probabilities.exp() * log_probabilities).sum(-1) * valid).sum() / count
     total = policy + weights.value * value - weights.entropy * entropy

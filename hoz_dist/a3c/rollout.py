@@ -31,10 +31,12 @@ class Rollout:
     log_probabilities: Tensor | None = None
     """Log-probabilities of the actions under the behaviour policy, float32 [T, B]; None if it is the policy that is
     differentiated."""
+    taken: int | None = None
+    """Number of actions taken, where not all of them are to be learnt from; None for those that are valid."""
 
     @property
     def frames(self) -> int:
-        """Number of actions taken."""
+        """Number of actions that are learnt from."""
         return int(self.valid.sum())
 
     def deltas(self, discount: float) -> Tensor:

@@ -1,11 +1,15 @@
 """Gradients of rollouts, on and off the policy that acted."""
 
+import math
 from dataclasses import replace
+from typing import Any
 
 import pytest
 import torch
 
+from hoz_dist.a3c import differentiation as module
 from hoz_dist.a3c.differentiation import Behaviour, Differentiator
+from hoz_dist.a3c.loss import Loss, a3c_loss
 from hoz_dist.a3c.rollout import Rollout
 from hoz_dist.config import RunConfig
 from hoz_dist.nav.observation import Observation
@@ -24,7 +28,7 @@ class Acted:
     """A rollout that a policy has really acted, as far as the network is concerned."""
 
     def __init__(self, config: RunConfig) -> None:
-        policy = make_policy(config.policy, seed=1)
+        self.policy = policy = make_policy(config.policy, seed=1)
         self.parameters = FlatParameters(policy)
         with torch.no_grad():
             # Far from uniform, so that probabilities differ.
@@ -71,16 +75,44 @@ def test_on_the_same_parameters_both_ways_give_the_same_gradient(method: Method)
     torch.testing.assert_close(state.zone.nodes, acted.after.zone.nodes)
 
 
-def test_what_another_policy_did_more_often_than_this_one_would_counts_less() -> None:
-    acted = Acted(
-        RunConfig(
-            batch=BATCH, rollout_steps=STEPS, gradient_norm=1e6, entropy_weight=0.0, scene_weight=0.0, value_weight=0.0
-        )
-    )
+def policy_alone(gae_lambda: float) -> Acted:
+    """A rollout whose gradient is that of the policy's term."""
+    config = RunConfig(batch=BATCH, rollout_steps=STEPS, gae_lambda=gae_lambda, gradient_norm=1e6)
+    return Acted(replace(config, entropy_weight=0.0, scene_weight=0.0, value_weight=0.0))
+
+
+@pytest.mark.parametrize("ratio", [0.5, 1e-3])
+def test_what_another_policy_did_more_often_than_this_one_would_counts_less(ratio: float) -> None:
+    """With lambda = 0 by just the ratio, whatever the advantages' size."""
+    acted = policy_alone(gae_lambda=0.0)
     on_policy, _ = acted.off_policy(acted.behaviour)
-    certain = acted.behaviour._replace(log_probabilities=torch.zeros(STEPS, BATCH))
-    found, _ = acted.off_policy(certain)
-    assert not torch.allclose(found, on_policy, rtol=0.1)
+    likelier = acted.behaviour.log_probabilities - math.log(ratio)
+    found, _ = acted.off_policy(acted.behaviour._replace(log_probabilities=likelier))
+    assert on_policy.norm() > 0.1
+    torch.testing.assert_close(found / ratio, on_policy, rtol=1e-3, atol=1e-5)
+
+
+def test_where_little_is_learnt_from_the_step_is_small() -> None:
+    acted = policy_alone(gae_lambda=0.95)
+    taken = int(acted.behaviour.valid.sum())
+    some = acted.behaviour._replace(valid=acted.behaviour.valid & (torch.arange(BATCH) == 1))
+    alone, _ = acted.off_policy(some)
+    among, _ = acted.off_policy(some._replace(taken=taken))
+    torch.testing.assert_close(among * taken, alone * int(some.valid.sum()), rtol=1e-3, atol=1e-5)
+
+
+def test_the_value_after_the_last_step_is_of_full_precision_as_the_actors(monkeypatch: pytest.MonkeyPatch) -> None:
+    acted = Acted(RunConfig(batch=BATCH, rollout_steps=STEPS, precision="bf16"))
+    seen: list[Rollout] = []
+
+    def noting(rollout: Rollout, *rest: Any) -> Loss:
+        seen.append(rollout)
+        return a3c_loss(rollout, *rest)
+
+    monkeypatch.setattr(module, "a3c_loss", noting)
+    _, state = acted.off_policy(acted.behaviour)
+    decision = acted.policy.act(step_of(acted.observation, STEPS), state, acted.bank)
+    torch.testing.assert_close(seen[0].bootstrap, decision.value, rtol=1e-5, atol=1e-6)
 
 
 def test_a_rollout_of_which_nothing_is_learnt_still_has_a_gradient() -> None:

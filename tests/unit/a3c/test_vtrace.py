@@ -7,7 +7,7 @@ import torch
 
 from hoz_dist.a3c.returns import generalized_advantages
 from hoz_dist.a3c.rollout import Rollout
-from hoz_dist.a3c.vtrace import vtrace_advantages
+from hoz_dist.a3c.vtrace import vtrace
 from tests.unit.a3c.making import make_rollout
 
 
@@ -58,7 +58,8 @@ def test_advantages_and_targets_are_those_of_the_definition(discount: float, gae
     rollout, learner = off_policy(3)
     for part in (rollout.terminated, rollout.truncated, ~rollout.valid):
         assert part.any()
-    advantages, targets = vtrace_advantages(rollout, learner, discount, gae_lambda)
+    ratios, before, targets = vtrace(rollout, learner, discount, gae_lambda)
+    advantages = ratios * before
     slow_advantages, slow_targets = slow_vtrace(rollout, learner, discount, gae_lambda)
     np.testing.assert_allclose(advantages.numpy(), slow_advantages, atol=1e-5)
     np.testing.assert_allclose(targets.numpy(), slow_targets, atol=1e-5)
@@ -68,22 +69,22 @@ def test_advantages_and_targets_are_those_of_the_definition(discount: float, gae
 def test_on_policy_it_is_generalised_advantage_estimation(gae_lambda: float) -> None:
     rollout, learner = off_policy(5)
     same = replace(rollout, log_probabilities=learner)
-    for mine, theirs in zip(
-        vtrace_advantages(same, learner, 0.99, gae_lambda), generalized_advantages(same, 0.99, gae_lambda), strict=True
-    ):
+    ratios, *found = vtrace(same, learner, 0.99, gae_lambda)
+    assert (ratios == 1.0).all()
+    for mine, theirs in zip(found, generalized_advantages(same, 0.99, gae_lambda), strict=True):
         torch.testing.assert_close(mine, theirs, rtol=0.0, atol=0.0)
 
 
 def test_what_the_learner_would_never_do_teaches_nothing() -> None:
     rollout, _ = off_policy(7)
-    advantages, targets = vtrace_advantages(rollout, torch.full((14, 9), -60.0), 0.99, 0.95)
-    assert advantages.abs().max() < 1e-12
+    ratios, advantages, targets = vtrace(rollout, torch.full((14, 9), -60.0), 0.99, 0.95)
+    assert (ratios * advantages).abs().max() < 1e-12
     torch.testing.assert_close(targets, rollout.values)
 
 
 def test_what_the_learner_does_more_often_counts_no_more_than_once() -> None:
     rollout, _ = off_policy(8)
     assert rollout.log_probabilities is not None
-    likelier = vtrace_advantages(rollout, rollout.log_probabilities + 50.0, 0.99, 0.95)
-    on_policy = vtrace_advantages(rollout, rollout.log_probabilities, 0.99, 0.95)
+    likelier = vtrace(rollout, rollout.log_probabilities + 50.0, 0.99, 0.95)
+    on_policy = vtrace(rollout, rollout.log_probabilities, 0.99, 0.95)
     torch.testing.assert_close(likelier, on_policy)
