@@ -83,7 +83,8 @@ class ParametersFollower(Closing):
 
         Args:
             at_least: Epoch and version that they must have reached; None to ask for the newest in any case.
-            timeout_s: When to give up after the last shard that came, seconds; None for never.
+            timeout_s: When to give up after the last shard that came, or after a base that is older, seconds; None for
+                never.
 
         Raises:
             StoppedError: The stop event was set.
@@ -94,14 +95,21 @@ class ParametersFollower(Closing):
         if at_least is not None and self._fetched is not None and self._is_newest(self._fetched, at_least):
             return self._fetched
         wanted = max(at_least or (0, 0), self._fetched.head.stamp if self._fetched else (0, 0))
+        deadline, went_further = Deadline(timeout_s), False
         while True:
-            fetched = self._newest_or_base(wanted, timeout_s)
-            if fetched is not None:
-                self._fetched = fetched
-                return fetched
+            fetched, is_base = self._newest_or_base(wanted, timeout_s)
+            if fetched.head.stamp >= wanted:
+                # A base may be hundreds of versions old, and the newest is a delta away. But a learner that is faster
+                # than the link is always a version further: one more round is enough.
+                if not is_base or went_further or deadline.passed or self._is_newest(fetched, wanted):
+                    self._fetched = fetched
+                    return fetched
+                went_further = True
+            elif deadline.passed:
+                raise _not_served(wanted, timeout_s)
 
-    def _newest_or_base(self, wanted: tuple[int, int], timeout_s: float | None) -> Parameters | None:
-        """Fetch the newest parameters, or the base that is needed for that; None after a base that is not enough.
+    def _newest_or_base(self, wanted: tuple[int, int], timeout_s: float | None) -> tuple[Parameters, bool]:
+        """Fetch the newest parameters, or the base that is needed for that, and tell whether they are a base.
 
         Args:
             wanted: Epoch and version that they must have reached; a base need not.
@@ -124,12 +132,15 @@ class ParametersFollower(Closing):
             if isinstance(reply, ParametersHead) and self._base is not None and self._is_late_enough(reply, wanted):
                 # Of this version the base is; though perhaps it was fetched as that of another learner.
                 self._base = Base(Parameters(reply, self._base.parameters.vector), self._base.digest)
-                return self._base.parameters
+                return self._base.parameters, False
             if isinstance(reply, ParametersShard | ParametersDelta):
-                enough = self._is_late_enough(reply.head, wanted)
-                if (enough or self._is_base(reply)) and download.add(reply):
+                of_use = self._is_late_enough(reply.head, wanted) or self._is_base(reply)
+                if of_use and download.add(reply):
                     if (parameters := download.result()) is not None:
-                        return self._kept(parameters, renews=download.renews, enough=enough)
+                        is_base = self._deltas and download.renews
+                        if is_base:
+                            self._base = base_of(parameters)
+                        return parameters, is_base
                     window = MOST_UNDER_WAY if time.monotonic() - question.asked < FAST_S else 1
                     deadline, backoff = Deadline(timeout_s), Backoff(self._stop)
                     continue
@@ -137,17 +148,8 @@ class ParametersFollower(Closing):
             if reply is not None and not isinstance(reply, Busy):
                 download.begin_again()  # the version is gone; or another learner answers
             if deadline.passed:
-                message = f"The learner did not serve parameters of version {wanted[1]} or later in {timeout_s:g} s."
-                raise ConnectionFailedError(message)
+                raise _not_served(wanted, timeout_s)
             backoff.pause(deadline)
-
-    def _kept(self, parameters: Parameters, *, renews: bool, enough: bool) -> Parameters | None:
-        """Keep parameters if they are a base; return them unless something newer is wanted, or was heard of."""
-        if not (self._deltas and renews):
-            return parameters
-        self._base = base_of(parameters)
-        is_newest = self.newest is not None and parameters.head.stamp >= self.newest.stamp
-        return parameters if enough and is_newest else None
 
     def _is_base(self, part: ParametersShard | ParametersDelta) -> bool:
         """Tell whether a part is of a base."""
@@ -177,9 +179,15 @@ class ParametersFollower(Closing):
         return head.stamp >= wanted
 
     def _is_newest(self, fetched: Parameters, at_least: tuple[int, int]) -> bool:
-        """Tell whether parameters that were fetched suffice, and are the last that were heard of."""
-        return self.newest is not None and self.newest.stamp == fetched.head.stamp >= at_least
+        """Tell whether parameters that were fetched suffice, and no newer ones were heard of."""
+        return self.newest is not None and fetched.head.stamp >= max(self.newest.stamp, at_least)
 
     def close(self) -> None:
         """Stop following."""
         self._subscriber.close()
+
+
+def _not_served(wanted: tuple[int, int], timeout_s: float | None) -> ConnectionFailedError:
+    return ConnectionFailedError(
+        f"The learner did not serve parameters of version {wanted[1]} or later in {timeout_s:g} s."
+    )
