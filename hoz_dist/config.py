@@ -69,7 +69,7 @@ class RunConfig:
     parameters: ParametersForm = "full"
     """How parameters travel."""
     max_lag: int = 32
-    """Largest policy lag, versions, at which a gradient is applied."""
+    """Largest policy lag, versions, at which a gradient is applied; see `most_lag` for rollouts."""
     minutes: float | None = None
     """Budget of training time, minutes."""
     frames: int | None = None
@@ -110,6 +110,15 @@ class RunConfig:
             without=self.without,
             precision=self.precision,
         )
+
+    @property
+    def most_lag(self) -> int:
+        """Largest policy lag of a push that is applied, versions.
+
+        N actors in turns push gradients at a lag of N - 1. Of rollouts each has another one acted already, which makes
+        2 N - 1, and V-trace corrects for it: as many actors as with gradients may take part.
+        """
+        return self.max_lag if self.learn_from == "gradients" else 2 * self.max_lag + 1
 
     def to_json(self) -> dict[str, Any]:
         """Return the configuration as JSON values."""

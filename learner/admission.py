@@ -50,7 +50,7 @@ class Admission:
     def _of_any(
         self, push: GradientPush | TrajectoryPush, version: int, *, finished: bool
     ) -> Iterator[tuple[bool, Reason, str]]:
-        lag, epoch, bound = version - push.version, self._epoch, self._config.max_lag
+        lag, epoch, bound = version - push.version, self._epoch, self._config.most_lag
         kind, learn_from = "gradients" if isinstance(push, GradientPush) else "rollouts", self._config.learn_from
         yield kind != learn_from, Reason.KIND, f"this run learns from {learn_from}, not from {kind}"
         yield finished, Reason.FINISHED, "the budget is used up"

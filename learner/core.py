@@ -164,7 +164,7 @@ class LearnerCore:
             "episodes": statistics.episodes,
             "frames_per_second": round(statistics.frames_per_second(now), 1),
             "success": statistics.success(),
-            "lag": {"min": lag.minimum, "mean": round(lag.mean, 2), "max": lag.maximum, "bound": self.config.max_lag},
+            "lag": {"min": lag.minimum, "mean": round(lag.mean, 2), "max": lag.maximum, "bound": self.config.most_lag},
             "learning_rate": self.learning_rate,
             "losses": dict(statistics.losses),
             "progress": progress,
@@ -273,7 +273,8 @@ class LearnerCore:
         self._optimizer.set_progress(self.progress(now) or 0.0)
         if self._schedule is not None:
             self._optimizer.learning_rate = self._schedule.take(push.version)
-        self._optimizer.step(learnt.gradient, weight)
+        if learnt.frames:  # Adam would make a full step of a rollout of which nothing is known
+            self._optimizer.step(learnt.gradient, weight)
         self._seen.add(sender, push.sequence)
         self.version += 1
         self.statistics.applied(push.actor, push.incarnation, learnt.frames, lag, now)

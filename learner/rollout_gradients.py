@@ -32,7 +32,7 @@ from hoz_dist.sim.room_views import RoomViews
 from hoz_dist.sim.row_table import RowTable
 from hoz_dist.sim.view_source import StoredViews
 from hoz_dist.wire.protocol.rejection import Reason, RejectedError
-from hoz_dist.wire.protocol.trajectories import Flag, GraphUsed, Steps, TrajectoryPush
+from hoz_dist.wire.protocol.trajectories import Flag, Steps, TrajectoryPush
 from learner.rollout_states import Ended, RolloutStates
 
 GRAPH_VERSIONS: Final = 64
@@ -125,7 +125,7 @@ class RolloutGradients:
         """
         steps, rooms = push.steps, [self._rooms[used.room] for used in push.rooms]
         self._check(push, rooms)
-        bank = self._bank(push.graphs)
+        bank = self._bank(push)
         views = np.array([room.start for room in rooms], np.int64)[steps.room] + steps.view.astype(np.int64)
         self._check_moves(steps, views)
         before = self._states.before(push.actor, push.incarnation, push.sequence)
@@ -185,14 +185,17 @@ class RolloutGradients:
         if ((following != steps.view[1:]) & steps.has(Flag.VALID)[:-1]).any():
             raise RejectedError(Reason.RANGE, "an action does not lead to the view that follows")
 
-    def _bank(self, used: tuple[GraphUsed, ...]) -> GraphBank:
-        """Return the graphs that a rollout was guided by.
+    def _bank(self, push: TrajectoryPush) -> GraphBank:
+        """Return the graphs that a rollout was guided by; none without the zone layer.
 
         Raises:
             RejectedError: One of them is not, or no longer, known.
         """
+        guiding = {SCENES[index] for index in np.unique(push.steps.scene)} if self._config.policy.zone_layer else set()
         graphs = []
-        for one in used:
+        for one in push.graphs:
+            if one.scene not in guiding:
+                continue
             versions = self._graphs.get(one.scene, OrderedDict())
             graph = versions.get(one.version)
             if graph is None or one.epoch != self._epoch:

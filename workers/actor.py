@@ -181,7 +181,10 @@ class Actor:
                 raise HozError(message)
 
     def _refresh_graphs(self) -> None:
-        """Use the scene graphs that are new."""
+        """Use the scene graphs that are new; no longer, once there are any, those that a learner before this served.
+
+        Nobody may ever serve them again: a learner that was started again does not know the rooms that came last.
+        """
         for scene, message in self._link.scene_graphs().items():
             if self._scene_graphs.get(scene) is message:
                 continue
@@ -192,6 +195,11 @@ class Actor:
                 _log.warning("the learner's graph of %s cannot be used: %s", scene, error)
             else:
                 self._graphs_used[scene] = GraphUsed(scene, message.epoch, message.version)
+        old = [scene for scene, used in self._graphs_used.items() if used.epoch < self._epoch]
+        if len(old) < len(self._graphs_used):
+            for scene in old:
+                self._collector.drop_graph(scene)
+                del self._graphs_used[scene]
 
     def _fetch(self) -> Parameters:
         """Return the newest parameters; tell a learner that was restarted what it may have forgotten."""
@@ -238,7 +246,8 @@ class Actor:
         with self._clock("act"):
             trajectory = self._collector.record()
         self._report.add(trajectory.finished)
-        graphs = tuple(self._graphs_used.values()) if self._guided else ()
+        used = trajectory.scenes if self._guided else ()
+        graphs = tuple(self._graphs_used[scene] for scene in used if scene in self._graphs_used)
         self._settle_ahead()
         self._parameters = self._fetch()
         report = self._take_report() if self._report.is_due else None

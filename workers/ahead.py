@@ -37,7 +37,7 @@ class Ahead(Closing, Generic[T]):
         """Wait for the work that was begun last, and return its result once; then, and before the first, None.
 
         Raises:
-            Exception: What the work has raised.
+            BaseException: What the work has raised.
         """
         future, self._under_way = self._under_way, None
         return None if future is None else future.result()
@@ -53,5 +53,6 @@ class Ahead(Closing, Generic[T]):
             future, work = task
             try:
                 future.set_result(work())
-            except Exception as error:  # noqa: BLE001 - handed to who asks for the result
+            # All of them: a panic in native code is no `Exception`, and who asks must not wait for a dead thread.
+            except BaseException as error:  # noqa: BLE001 - handed to who asks for the result
                 future.set_exception(error)

@@ -44,6 +44,8 @@ class Trajectory(NamedTuple):
     steps: Steps
     rooms: tuple[RoomUsed, ...]
     """The rooms that the steps count."""
+    scenes: tuple[str, ...]
+    """The scenes whose graphs were used, if the policy has the zone layer."""
     frames: int
     finished: list[EpisodeResult]
 
@@ -85,9 +87,12 @@ class Collector:
             ValueError: The graph has other zones or categories.
         """
         self._bank.put(graph)
-        zone = self._state.zone
-        stale = zone.scene == SCENES.index(graph.scene)
-        self._state = self._state._replace(zone=zone._replace(scene=zone.scene.masked_fill(stale, -1)))
+        self._forget_copies(graph.scene)
+
+    def drop_graph(self, scene: str) -> None:
+        """Use the graph of a scene no longer, from the next step on; another scene's must be in use."""
+        self._bank.available[SCENES.index(scene)] = False
+        self._forget_copies(scene)
 
     def roll_out(self) -> Update:
         """Run T steps in every episode, then go back over them once.
@@ -120,7 +125,13 @@ class Collector:
         """
         acted, after = self._act()
         steps, rooms = steps_of(acted, after, self._env.rooms)
-        return Trajectory(steps, rooms, int(steps.has(Flag.VALID).sum()), _finished(acted))
+        scenes = tuple(SCENES[index] for index in np.unique(steps.scene))
+        return Trajectory(steps, rooms, scenes, int(steps.has(Flag.VALID).sum()), _finished(acted))
+
+    def _forget_copies(self, scene: str) -> None:
+        zone = self._state.zone
+        stale = zone.scene == SCENES.index(scene)
+        self._state = self._state._replace(zone=zone._replace(scene=zone.scene.masked_fill(stale, -1)))
 
     def _act(self) -> tuple[list[Acted], Seen]:
         """Run T steps in every episode; return them, and what is seen after the last."""

@@ -79,7 +79,7 @@ _OPTIONS: Final = (
         type=int,
         default=RunConfig.max_lag,
         show_default=True,
-        help="Largest policy lag of a gradient that is applied, parameter versions.",
+        help="Largest policy lag of a gradient that is applied, parameter versions; of a rollout twice as much and 1.",
     ),
 )
 

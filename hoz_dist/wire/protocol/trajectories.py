@@ -172,7 +172,7 @@ class TrajectoryPush(Push):
         epoch: Epoch of the parameters that were acted on.
         version: Version of the parameters that were acted on.
         rooms: The rooms that ``steps.room`` is an index of, each once.
-        graphs: The scene graphs in use, at most one of a scene; none without the zone layer.
+        graphs: The scene graphs that ``steps.scene`` names, at most one of a scene; none without the zone layer.
         steps: What was done and seen.
     """
 

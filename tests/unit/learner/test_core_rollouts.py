@@ -13,7 +13,8 @@ from hoz_dist.policy.parameters import initial_parameters
 from hoz_dist.wire.protocol.answers import Accepted, Busy, Refused
 from hoz_dist.wire.protocol.pushes import GradientPush, RoomGraphPush
 from hoz_dist.wire.protocol.rejection import Reason
-from hoz_dist.wire.protocol.trajectories import GraphUsed, TrajectoryPush
+from hoz_dist.wire.protocol.trajectories import Flag, GraphUsed, TrajectoryPush
+from learner.admission import Admission
 from learner.core import LearnerCore
 from learner.events import (
     EpisodesReceived,
@@ -95,6 +96,36 @@ def test_without_lag_a_run_goes_as_one_that_learns_from_gradients() -> None:
     assert by_rollouts.version == 3
 
 
+def test_a_rollout_of_which_nothing_is_known_moves_nothing() -> None:
+    """Adam would make a full step of its tiny gradient."""
+    config = replace(ROLLOUTS, batch=2, rollout_steps=2)
+    core, actor = new_core(config), make_collector(config, max_actions=100)
+    push = rollout(actor)
+    while push.steps.has(Flag.FIRST).any():
+        push = rollout(actor, 1)
+    before = core.parameters.copy()
+    assert isinstance(answer(core, TrajectoryReceived(0, push)), Accepted)
+    assert core.version == 1
+    np.testing.assert_array_equal(core.parameters, before)
+    assert core.statistics.frames == 0
+
+
+@pytest.mark.parametrize("actors", [1, 17])
+def test_as_many_actors_as_with_gradients_take_part_though_each_has_a_rollout_under_way(actors: int) -> None:
+    """Each asks for parameters before it pushes what it acted on those before, and they are taken in turns."""
+    admission = Admission(replace(ROLLOUTS, max_lag=actors - 1), 1, 1, None)
+    push = rollout(make_collector(ROLLOUTS))
+    acted_on, fetched = [0] * actors, [0] * actors
+    lags = set()
+    for version in range(6 * actors):
+        actor = version % actors
+        assert admission.refusal(replace(push, version=acted_on[actor]), version, finished=False) is None
+        lags.add(version - acted_on[actor])
+        acted_on[actor], fetched[actor] = fetched[actor], version + 1
+    assert max(lags) == 2 * actors - 1
+    assert admission.refusal(replace(push, version=0), 2 * actors, finished=False) is not None
+
+
 def test_a_repeated_rollout_counts_once() -> None:
     core = new_core()
     event = TrajectoryReceived(0, rollout(make_collector(ROLLOUTS)))
@@ -155,11 +186,11 @@ def test_a_rollout_of_another_epoch_or_too_old_is_refused() -> None:
     core, actor = new_core(), make_collector(ROLLOUTS)
     assert refused(core, rollout(actor, 0, epoch=2)).reason == Reason.EPOCH
     assert refused(core, rollout(actor, 1, version=1)).reason == Reason.STALE
-    for version in range(ROLLOUTS.max_lag + 1):
+    for version in range(ROLLOUTS.most_lag + 1):
         assert isinstance(answer(core, TrajectoryReceived(0, rollout(actor, version + 2, version))), Accepted)
     assert refused(core, rollout(actor, 9, version=0)).reason == Reason.STALE
     assert isinstance(answer(core, TrajectoryReceived(0, rollout(actor, 10, version=1))), Accepted)
-    assert core.statistics.lag().maximum == ROLLOUTS.max_lag
+    assert core.statistics.lag().maximum == ROLLOUTS.most_lag
 
 
 def test_what_the_rooms_cannot_have_held_is_refused_and_does_not_count() -> None:

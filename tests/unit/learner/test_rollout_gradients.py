@@ -200,4 +200,6 @@ def test_what_cannot_have_happened_in_these_rooms_is_refused() -> None:
         with pytest.raises(RejectedError, match=what) as caught:
             gradients.learn(wrong)
         assert caught.value.reason == Reason.RANGE
+    unknown = dataclasses.replace(push, graphs=(*USED, GraphUsed("bathroom", 9, 9)))
+    assert gradients.learn(unknown).frames == push.frames, "a graph that was not used is not looked at"
     assert gradients.learn(push).frames == push.frames, "what was refused left nothing behind"

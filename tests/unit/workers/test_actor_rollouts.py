@@ -5,9 +5,11 @@ from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from hoz_dist.errors import HozError
+from hoz_dist.nav.categories import SCENES
 from hoz_dist.policy.parameters import initial_parameters
 from hoz_dist.waiting import StoppedError
 from hoz_dist.wire.protocol.answers import Accepted, Refused
@@ -30,16 +32,24 @@ class FakeLearner:
         self.asked: list[tuple[int, int] | None] = []
         self.pushed: list[tuple[int, int]] = []
         self.graphs: list[tuple[GraphUsed, ...]] = []
+        self.scenes: list[set[str]] = []
+        """Those that the steps of each rollout were guided by the graphs of."""
         self.reports: list[int] = []
         self._stop, self._answers, self._vector = stop, answers, vector
-        self._graph = scene_graph_reply(scene_graph("kitchen", 0, version=3), 1)
+        self.served = {"kitchen": scene_graph_reply(scene_graph("kitchen", 0, version=3), 1)}
+        self.restarts_after: int | None = None
 
     def parameters(self, at_least: tuple[int, int] | None) -> Any:
         self.asked.append(at_least)
-        return SimpleNamespace(head=SimpleNamespace(epoch=1, stamp=(1, self.version)), vector=self._vector)
+        return SimpleNamespace(
+            head=SimpleNamespace(epoch=self.epoch, stamp=(self.epoch, self.version)), vector=self._vector
+        )
 
     def scene_graphs(self) -> dict[str, Any]:
-        return {"kitchen": self._graph}
+        return self.served
+
+    def check_same_run(self) -> None:
+        pass
 
     def push_room_graph(self, *_: Any) -> Accepted | Refused:
         return Accepted(1, self.version)
@@ -53,6 +63,11 @@ class FakeLearner:
         assert steps.action.shape == (ROLLOUTS.rollout_steps, ROLLOUTS.batch)
         self.pushed.append(stamp)
         self.graphs.append(graphs)
+        self.scenes.append({SCENES[index] for index in np.unique(steps.scene)})
+        if len(self.pushed) == self.restarts_after:
+            # A learner that has forgotten the bedrooms.
+            self.epoch += 1
+            self.served = self.served | {"kitchen": scene_graph_reply(scene_graph("kitchen", 0), self.epoch)}
         if len(self.pushed) == len(self._answers):
             self._stop.set()
         answer = self._answers[len(self.pushed) - 1]
@@ -65,10 +80,15 @@ class FakeLearner:
         return Accepted(1, self.version)
 
 
-def work(monkeypatch: pytest.MonkeyPatch, *answers: Accepted | Refused) -> FakeLearner:
-    """Let an actor work until it has had all the answers."""
+def work(
+    monkeypatch: pytest.MonkeyPatch, *answers: Accepted | Refused, restarts_after: int | None = None
+) -> FakeLearner:
+    """Let an actor work until it has had all the answers; with a restart, of a learner that served two graphs."""
     stop = threading.Event()
     learner = FakeLearner(stop, list(answers), initial_parameters(ROLLOUTS.policy, 0))
+    learner.restarts_after = restarts_after
+    if restarts_after is not None:
+        learner.served["bedroom"] = scene_graph_reply(scene_graph("bedroom", 1), 1)
     room = SimpleNamespace(graph=None, views=room_views(KITCHEN))
     monkeypatch.setattr(module, "RoomPreparation", lambda *_, **__: SimpleNamespace(waiting=0, next=lambda *_: room))
     nothing: Any = None
@@ -86,6 +106,17 @@ def test_each_rollout_is_acted_on_parameters_that_lack_one_rollout(monkeypatch: 
     assert learner.pushed == [(1, 0), (1, 0), (1, 1), (1, 2), (1, 3), (1, 4)]
     assert learner.asked[:4] == [None, None, (1, 1), (1, 2)]
     assert {(used.scene, used.epoch, used.version) for (used,) in learner.graphs} == {("kitchen", 1, 3)}
+
+
+def test_graphs_that_were_not_used_are_not_named_and_those_of_a_learner_that_is_gone_not_used(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    learner = work(monkeypatch, *accepted(8), restarts_after=3)
+    named = [{used.scene for used in graphs} for graphs in learner.graphs]
+    assert named == learner.scenes
+    assert {"bedroom"} < set().union(*named[:3])
+    # What was acted before the actor heard of it goes on being of the old epoch, and is refused once.
+    assert {(used.scene, used.epoch) for graphs in learner.graphs[4:] for used in graphs} == {("kitchen", 2)}
 
 
 def test_finished_episodes_are_reported_along_with_rollouts(monkeypatch: pytest.MonkeyPatch) -> None:

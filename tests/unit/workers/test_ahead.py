@@ -17,13 +17,14 @@ def test_work_goes_on_meanwhile_and_its_result_is_given_once() -> None:
         assert ahead.result() == "again"
 
 
-def test_what_the_work_raises_is_raised_where_its_result_is_asked_for() -> None:
+@pytest.mark.parametrize("error", [KeyError, SystemExit])
+def test_what_the_work_raises_is_raised_where_its_result_is_asked_for(error: type[BaseException]) -> None:
     def fail() -> str:
-        raise KeyError("x")
+        raise error
 
     with Ahead[str]("test") as ahead:
         ahead.start(fail)
-        with pytest.raises(KeyError):
+        with pytest.raises(error):
             ahead.result()
         ahead.start(lambda: "goes on")
         assert ahead.result() == "goes on"
