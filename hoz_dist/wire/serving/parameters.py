@@ -151,8 +151,6 @@ class ParametersPublisher(Closing):
                 return None
         if number >= edition.shards:
             raise RejectedError(Reason.RANGE, f"shard {number} was asked for, and there are {edition.shards}")
-        if number == edition.shards - 1:
-            self._versions.end(reader)
         return edition.part(number)
 
     def _next_for(self, base: str, newest: Full) -> Edition | None:

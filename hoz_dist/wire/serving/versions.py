@@ -26,13 +26,19 @@ class _Reading(NamedTuple):
     time: float
     """When it asked for that shard for the first time."""
 
+    @property
+    def finished(self) -> bool:
+        """Whether the reader has asked for all; an answer may be lost, and be asked for once more."""
+        return self.shard >= self.edition.shards - 1
+
 
 class Versions:
     """The newest version and those being read, each array once; may be used from several threads.
 
     A reader is begun with an edition, of the newest version mostly, and can then read all of it, as long as it gets on
     and there is room. So a slow reader neither gets parts of two versions nor has to begin again, however fast the
-    learner is. Nobody can keep the others out: what was held longest makes room.
+    learner is. Who has read all may ask again for what was lost on the way, until it begins anew. When there is no
+    room, those who have read all make some first. Nobody can keep the others out: what was held longest makes room.
 
     Args:
         most_readers: Largest number of readers.
@@ -56,6 +62,9 @@ class Versions:
         """Keep an edition for a reader of its shard 0; False when nothing more can be kept."""
         with self._lock:
             self._expire(now, EXPIRES_S)
+            if reader in self._readings and self._readings[reader].finished:
+                del self._readings[reader]
+            self._drop_the_finished()
             if not self._has_room():
                 self._expire(now, YIELDS_S)
             while not self._has_room():
@@ -92,11 +101,6 @@ class Versions:
             newest = self.newest
             return newest if not deltas and newest is not None and newest.head.stamp == stamp else None
 
-    def end(self, reader: str) -> None:
-        """Forget a reader that has read all."""
-        with self._lock:
-            self._readings.pop(reader, None)
-
     def kept_bytes(self) -> int:
         """Return the bytes of all that is kept."""
         with self._lock:
@@ -106,11 +110,19 @@ class Versions:
         return len(self._readings) < self._most_readers and self._bytes() <= self._most_bytes
 
     def _bytes(self) -> int:
-        kept: set[Edition] = {reading.edition for reading in self._readings.values()}
-        kept.update(self.besides)
-        if self.newest is not None:
-            kept.add(self.newest)
+        kept = {reading.edition for reading in self._readings.values()} | self._kept_anyway()
         return sum(edition.nbytes for edition in kept)
+
+    def _kept_anyway(self) -> set[Edition]:
+        """Return what is kept whether somebody reads it or not."""
+        return {*self.besides, *(() if self.newest is None else (self.newest,))}
+
+    def _in_the_way(self) -> list[tuple[str, _Reading]]:
+        """Return the readers that make room when they are forgotten, the one that got on longest ago first."""
+        if len(self._readings) >= self._most_readers:
+            return list(self._readings.items())
+        anyway = self._kept_anyway()
+        return [(name, one) for name, one in self._readings.items() if one.edition not in anyway]
 
     def _expire(self, now: float, after_s: float) -> None:
         """Forget the readers that did not get on for so long."""
@@ -120,9 +132,18 @@ class Versions:
                 break
             del self._readings[reader]
 
+    def _drop_the_finished(self) -> None:
+        """Forget readers that have read all, until there is room."""
+        while not self._has_room():
+            finished = next((name for name, reading in self._in_the_way() if reading.finished), None)
+            if finished is None:
+                return
+            del self._readings[finished]
+
     def _drop_the_oldest(self, now: float) -> bool:
         """Forget the readers of the edition that is held longest; False when none is held long enough."""
-        oldest = min(self._readings.values(), key=lambda reading: reading.began, default=None)
+        readings = (reading for _, reading in self._in_the_way())
+        oldest = min(readings, key=lambda reading: reading.began, default=None)
         if oldest is None or now - oldest.began < HELD_S:
             return False
         for reader in [name for name, one in self._readings.items() if one.edition is oldest.edition]:

@@ -174,6 +174,18 @@ def test_who_does_not_begin_with_the_first_shard_is_refused_and_nothing_is_kept(
     assert learner.rejections.by_reason() == {"range": 3}
 
 
+def test_a_shard_that_was_lost_is_asked_for_once_more_though_the_last_one_was_under_way(
+    learner: Server, client: Session
+) -> None:
+    with ParametersPublisher(learner.session, KEYS) as publisher:
+        publisher.publish(1, 0, np.zeros(3 * SHARD_ELEMENTS, np.float32))
+        for number in (0, 1, 2):
+            ask(client, f"{KEYS.shard(number)}?reader=a" + (";epoch=1;version=0" if number else ""), timeout_s=5.0)
+        publisher.publish(1, 1, np.ones(3 * SHARD_ELEMENTS, np.float32))
+        (answer,) = ask(client, f"{KEYS.shard(1)}?reader=a;epoch=1;version=0", timeout_s=5.0)
+        assert decode(answer.payload, ParametersShard).head.version == 0
+
+
 def test_parameters_never_run_backwards_but_a_new_epoch_may_begin_lower(learner: Server, client: Session) -> None:
     with (
         ParametersFollower(client, KEYS, threading.Event()) as follower,

@@ -29,10 +29,8 @@ def test_a_reader_keeps_the_version_that_it_began_with() -> None:
         versions.newest = version(number)
     assert versions.go_on("slow", (1, 1), 1, 1.0) is first
     assert versions.kept_bytes() == 2 * BYTES, "the versions in between are not kept"
-    versions.end("slow")
-    assert versions.kept_bytes() == BYTES
-    assert versions.go_on("slow", (1, 1), 2, 2.0) is None
-    assert versions.go_on("slow", (1, 49), 2, 2.0) is versions.newest
+    assert versions.go_on("other", (1, 1), 2, 2.0) is None
+    assert versions.go_on("other", (1, 49), 2, 2.0) is versions.newest
 
 
 def test_readers_of_one_version_share_it_and_one_that_begins_again_lets_go_of_it() -> None:
@@ -81,7 +79,7 @@ def test_the_number_of_readers_is_bounded() -> None:
     assert begin(versions, "a", 0.0)
     assert begin(versions, "b", 0.0)
     assert not begin(versions, "c", 0.0)
-    versions.end("a")
+    assert versions.go_on("a", (1, 1), SHARDS - 1, 0.0) is not None
     assert begin(versions, "c", 0.0)
 
 
@@ -125,7 +123,7 @@ def test_a_slow_reader_goes_on_for_as_long_as_there_is_room() -> None:
         versions.newest = version(1 + shard)
         begin(versions, "fast", 60.0 * shard)
         assert versions.go_on("slow", (1, 1), shard, 60.0 * shard) is first
-        versions.end("fast")
+        versions.go_on("fast", (1, 1 + shard), SHARDS - 1, 60.0 * shard)
 
 
 def test_readers_without_end_make_room_as_well() -> None:
@@ -166,6 +164,46 @@ def test_the_newest_version_is_no_substitute_for_what_a_delta_made() -> None:
     made = version(1)
     assert versions.begin("a", made, 0.0)
     assert versions.go_on("a", (1, 1), 1, 0.0, deltas=True) is made
-    versions.end("a")
-    assert versions.go_on("a", (1, 1), 1, 0.0) is versions.newest
-    assert versions.go_on("a", (1, 1), 1, 0.0, deltas=True) is None
+    assert versions.go_on("b", (1, 1), 1, 0.0) is versions.newest
+    assert versions.go_on("b", (1, 1), 1, 0.0, deltas=True) is None
+
+
+def test_a_shard_that_was_lost_can_be_asked_for_after_the_last_one_until_the_reader_begins_anew() -> None:
+    versions = Versions()
+    versions.newest = first = version(1)
+    begin(versions, "a", 0.0)
+    versions.newest = version(2)
+    assert versions.go_on("a", (1, 1), SHARDS - 1, 1.0) is first
+    assert versions.go_on("a", (1, 1), SHARDS - 2, 2.0) is first
+    begin(versions, "a", 3.0)
+    assert versions.go_on("a", (1, 1), SHARDS - 2, 3.0) is None
+    assert versions.kept_bytes() == BYTES
+
+
+def test_those_who_have_read_all_make_room_at_once_and_the_others_go_on() -> None:
+    versions = Versions(most_bytes=3 * BYTES)
+    for number in range(1, 4):
+        versions.newest = version(number)
+        begin(versions, f"r{number}", 0.0)
+    assert versions.go_on("r2", (1, 2), SHARDS - 1, 0.0) is not None
+    versions.newest = version(4)
+    assert begin(versions, "late", 0.0)
+    assert versions.go_on("r2", (1, 2), SHARDS - 1, 0.0) is None
+    for number in (1, 3):
+        assert versions.go_on(f"r{number}", (1, number), 1, 0.0) is not None
+
+
+def test_readers_of_what_is_kept_anyway_are_not_forgotten_to_make_room() -> None:
+    versions = Versions(most_bytes=2 * BYTES)
+    base = version(0)
+    versions.newest = version(1)
+    versions.besides = (base,)
+    versions.begin("first", base, 0.0)
+    begin(versions, "second", 1.0)
+    versions.newest = version(2)
+    for second in range(2, int(HELD_S) + 1):
+        for reader, number in (("first", 0), ("second", 1)):
+            assert versions.go_on(reader, (1, number), second, second) is not None
+    assert begin(versions, "late", HELD_S + 1)
+    assert versions.go_on("first", (1, 0), 70, HELD_S + 1) is base, "to forget it would have freed nothing"
+    assert versions.go_on("second", (1, 1), 70, HELD_S + 1) is None
