@@ -82,7 +82,9 @@ class ParametersPublisher(Closing):
             vector: [P] f32; copied, so that the learner may go on with its own.
         """
         head = ParametersHead(epoch, version, vector.size)
-        self._versions.newest = Full(head, self._buffers.copy(vector))
+        newest = Full(head, self._buffers.copy(vector))
+        self._bases.publish(newest)
+        self._versions.newest = newest
         self._publisher.publish(encode(head))
         return head
 
@@ -144,18 +146,19 @@ class ParametersPublisher(Closing):
         elif number > 0:
             raise RejectedError(Reason.RANGE, f"shard {number} of no version was asked for; only 0 is the newest's")
         else:
-            edition = newest if base is None else self._next_for(base, newest)
-            if edition is None:
-                return newest.head
+            following = newest if base is None else self._next_for(base)
+            if following is None or isinstance(following, ParametersHead):
+                return following
+            edition = following
             if not self._versions.begin(reader, edition, now):
                 return None
         if number >= edition.shards:
             raise RejectedError(Reason.RANGE, f"shard {number} was asked for, and there are {edition.shards}")
         return edition.part(number)
 
-    def _next_for(self, base: str, newest: Full) -> Edition | None:
-        """Return what a reader of deltas needs; None when its base is the newest version."""
-        edition = self._bases.next_for(base, newest)
+    def _next_for(self, base: str) -> Edition | ParametersHead | None:
+        """Return what a reader of deltas needs; see `Bases.next_for`."""
+        edition = self._bases.next_for(base)
         self._versions.besides = self._bases.kept
         return edition
 

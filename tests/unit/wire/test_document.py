@@ -116,7 +116,7 @@ def test_the_documented_limits_are_those_of_the_code() -> None:
         assert f"| {part.LENGTH:,} of them in all shards but the last" in section(part.KIND)
         assert f"At most {part.MOST_BYTES >> 10} KiB." in section(part.KIND)
     assert f"one for each {BLOCK} values" in DOCUMENT
-    assert f"about every {LONGEST_LIFE} versions" in DOCUMENT
+    assert f"at every multiple of {LONGEST_LIFE} versions" in DOCUMENT
     assert MOST_UNDER_WAY == 2, "two questions may be without their answer"
     assert f"longer than {1000 * FAST_S:g} ms" in DOCUMENT
     assert f"{MOST_WAITING} pushes and {MOST_WAITING_BYTES >> 20} MiB wait at the learner" in DOCUMENT

@@ -26,8 +26,10 @@ BASE = base_of(Parameters(OLD.head, OLD.vector))
 @pytest.fixture
 def delta() -> Delta:
     bases = Bases(Buffers())
-    bases.next_for("none", OLD)
-    edition = bases.next_for(BASE.digest, FULL)
+    bases.publish(OLD)
+    bases.next_for("none")
+    bases.publish(FULL)
+    edition = bases.next_for(BASE.digest)
     assert isinstance(edition, Delta)
     return edition
 
