@@ -20,7 +20,6 @@ from hoz_dist.gradient_forms import Vector
 from hoz_dist.graph.room_graph import RoomGraph
 from hoz_dist.nav.categories import TARGETS
 from hoz_dist.nav.rooms import RoomId
-from hoz_dist.sim.room_views import RoomViews
 from hoz_dist.wire.protocol.answers import Accepted, Busy, Refused
 from hoz_dist.wire.protocol.pushes import GradientPush, RoomGraphPush
 from hoz_dist.wire.protocol.rejection import Reason, RejectedError
@@ -42,6 +41,7 @@ from learner.events import (
     Reply,
     RoomGraphReceived,
     RoomOpened,
+    RoomUnusable,
     SaveCheckpoint,
     Tick,
     TrajectoryReceived,
@@ -177,7 +177,7 @@ class LearnerCore:
                 scene: {"version": graph.version, "rooms": list(graph.rooms)}
                 for scene, graph in self.graphs.scenes.items()
             },
-            "replay": self._replay_status(),
+            "replay": None if self._schedule is None else self._schedule.status(),
             "actors": {process: actor.summary(now) for process, actor in statistics.actors.items()},
         }
 
@@ -209,8 +209,8 @@ class LearnerCore:
                 effects = self._room_graph(request, push, now)
             case TrajectoryReceived(request, push):
                 effects = self._trajectory(request, push, now)
-            case RoomOpened(views):
-                effects = self._room_opened(views)
+            case RoomOpened() | RoomUnusable():
+                effects = self._room_news(event)
             case Tick():
                 effects = iter(())
         return [*effects, *self._housekeeping(now)]
@@ -248,12 +248,12 @@ class LearnerCore:
             yield self._refuse(request, *refusal)
             return
         assert self._rollouts is not None  # noqa: S101 - otherwise it was refused
-        missing = self._rollouts.missing(push)
-        if missing or (self._schedule is not None and self._schedule.turn(push.actor, push.sequence) == "later"):
-            yield from map(OpenRoom, missing)
-            yield Reply(request, Busy(self.epoch))
-            return
         try:
+            missing = self._rollouts.missing(push, self.graphs.rooms)
+            if missing or (self._schedule is not None and self._schedule.turn(push.actor, push.sequence) == "later"):
+                yield from map(OpenRoom, missing)
+                yield Reply(request, Busy(self.epoch))
+                return
             learnt = self._rollouts.learn(push)
         except RejectedError as error:
             yield self._refuse(request, error.reason, error.detail)
@@ -327,9 +327,13 @@ class LearnerCore:
                 yield OpenRoom(push.room)
         yield Reply(request, self._accepted())
 
-    def _room_opened(self, views: RoomViews) -> Iterator[Effect]:
+    def _room_news(self, news: RoomOpened | RoomUnusable) -> Iterator[Effect]:
         if self._rollouts is not None:
-            self._rollouts.add_room(views)
+            match news:
+                case RoomOpened(views):
+                    self._rollouts.add_room(views)
+                case RoomUnusable(room, detail):
+                    self._rollouts.refuse_room(room, detail)
         return iter(())
 
     def _repeated(self, request: int) -> Reply:
@@ -376,11 +380,6 @@ class LearnerCore:
         if progress is None or self.config.frames is None or rate <= 0.0:
             return None
         return round(max(self.config.frames - self.statistics.frames, 0) / rate, 1)
-
-    def _replay_status(self) -> dict[str, int] | None:
-        if self._schedule is None:
-            return None
-        return {"applied": self._schedule.applied, "total": self._schedule.total, "diverged": self._schedule.diverged}
 
     def _resume(self, checkpoint: Checkpoint, room_digests: Mapping[str, str]) -> None:
         if checkpoint.parameters.size != self._optimizer.size:

@@ -52,11 +52,19 @@ class RoomOpened:
 
 
 @dataclass(frozen=True, slots=True)
+class RoomUnusable:
+    """The views of a room cannot be had, now or later."""
+
+    room: RoomId
+    detail: str
+
+
+@dataclass(frozen=True, slots=True)
 class Tick:
     """Time went by."""
 
 
-Event = GradientReceived | EpisodesReceived | RoomGraphReceived | TrajectoryReceived | RoomOpened | Tick
+Event = GradientReceived | EpisodesReceived | RoomGraphReceived | TrajectoryReceived | RoomOpened | RoomUnusable | Tick
 
 # Effects.
 

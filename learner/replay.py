@@ -179,6 +179,10 @@ class Schedule:
         """Whether every recorded update was repeated."""
         return self._next == len(self._records)
 
+    def status(self) -> dict[str, int]:
+        """Return how far it is, as JSON values."""
+        return {"applied": self.applied, "total": self.total, "diverged": self.diverged}
+
     def turn(self, actor: str, sequence: int) -> Literal["now", "later", "never"]:
         """Tell when a gradient is to be applied: never, when the recorded run did not apply it."""
         if self._left[actor, sequence] == 0:

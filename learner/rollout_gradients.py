@@ -7,7 +7,7 @@ begins with the zero state, and learns nothing from the steps of an episode unti
 """
 
 from collections import OrderedDict
-from collections.abc import Iterable
+from collections.abc import Container, Iterable
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -71,6 +71,8 @@ class RolloutGradients:
         self._parameters = FlatParameters(self._policy)
         self._differentiator = Differentiator(config, self._policy, self._parameters)
         self._rooms: dict[RoomId, _OpenRoom] = {}
+        self._unusable: dict[RoomId, str] = {}
+        """Why rooms cannot be opened."""
         self._source = StoredViews()
         self._transitions: RowTable[np.int32] = RowTable()
         self._epoch = 0
@@ -113,12 +115,31 @@ class RolloutGradients:
         """Tell whether a room is open."""
         return room in self._rooms
 
-    def missing(self, push: TrajectoryPush) -> list[RoomId]:
-        """Return the rooms of a rollout that are not open yet."""
-        return [used.room for used in push.rooms if used.room not in self._rooms]
+    def refuse_room(self, room: RoomId, detail: str) -> None:
+        """Refuse what happened in a room that cannot be opened here."""
+        self._unusable[room] = detail
+
+    def missing(self, push: TrajectoryPush, explored: Container[str]) -> list[RoomId]:
+        """Return the rooms of a rollout that are not open yet.
+
+        Args:
+            push: The rollout.
+            explored: Names of the rooms whose graph an actor has pushed; no others are worth opening.
+
+        Raises:
+            RejectedError: The rollout is not of the run's shape, or in rooms that cannot be opened.
+        """
+        self._check_shape(push.steps)
+        missing = [used.room for used in push.rooms if used.room not in self._rooms]
+        for room in missing:
+            if room in self._unusable:
+                raise RejectedError(Reason.DIGEST, f"{room} cannot be made here: {self._unusable[room]}")
+            if str(room) not in explored:
+                raise RejectedError(Reason.STALE, f"the graph of {room} is not known; push it first")
+        return missing
 
     def learn(self, push: TrajectoryPush) -> Learnt:
-        """Compute the gradient of a rollout whose rooms are open.
+        """Compute the gradient of a rollout of which `missing` returned no rooms.
 
         Raises:
             RejectedError: The rollout is not one of this run, or cannot have been made in these rooms.
@@ -158,12 +179,14 @@ class RolloutGradients:
             first=steps.has(Flag.FIRST),
         )
 
+    def _check_shape(self, steps: Steps) -> None:
+        expected = (self._config.rollout_steps, self._config.batch)
+        if steps.action.shape != expected:
+            raise RejectedError(Reason.SHAPE, f"a rollout of {steps.action.shape}; those of the run are {expected}")
+
     def _check(self, push: TrajectoryPush, rooms: list[_OpenRoom]) -> None:
         """Judge a rollout by the run's configuration and by the rooms."""
         steps, config = push.steps, self._config
-        expected = (config.rollout_steps, config.batch)
-        if steps.action.shape != expected:
-            raise RejectedError(Reason.SHAPE, f"a rollout of {steps.action.shape}; those of the run are {expected}")
         for used, room in zip(push.rooms, rooms, strict=True):
             if used.digest != room.views.digest:
                 raise RejectedError(Reason.DIGEST, f"{used.room} has another content here")

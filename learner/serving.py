@@ -47,7 +47,6 @@ from learner.events import (
     RecordUpdate,
     Reply,
     RoomGraphReceived,
-    RoomOpened,
     SaveCheckpoint,
     Tick,
     TrajectoryReceived,
@@ -169,8 +168,8 @@ class Learner:
             # After the wait, and before the push is handled: this process may have stood still in between.
             if not self._leads(now):
                 return
-            for views in self._rooms.opened() if self._rooms is not None else ():
-                self._carry_out(self._core.handle(RoomOpened(views), now), None, now)
+            for news in self._rooms.news() if self._rooms is not None else ():
+                self._carry_out(self._core.handle(news, now), None, now)
             if request is None:
                 self._carry_out(self._core.handle(Tick(), now), None, now)
             else:

@@ -9,11 +9,12 @@ import pytest
 from hoz_dist.config import RunConfig
 from hoz_dist.graph.room_graph import RoomGraph
 from hoz_dist.nav.categories import TARGETS
+from hoz_dist.nav.rooms import RoomId
 from hoz_dist.policy.parameters import initial_parameters
 from hoz_dist.wire.protocol.answers import Accepted, Busy, Refused
 from hoz_dist.wire.protocol.pushes import GradientPush, RoomGraphPush
 from hoz_dist.wire.protocol.rejection import Reason
-from hoz_dist.wire.protocol.trajectories import Flag, GraphUsed, TrajectoryPush
+from hoz_dist.wire.protocol.trajectories import Flag, GraphUsed, RoomUsed, TrajectoryPush
 from learner.admission import Admission
 from learner.core import LearnerCore
 from learner.events import (
@@ -25,6 +26,7 @@ from learner.events import (
     Reply,
     RoomGraphReceived,
     RoomOpened,
+    RoomUnusable,
     TrajectoryReceived,
 )
 from learner.replay import Schedule, UpdateRecord
@@ -147,6 +149,22 @@ def test_a_rollout_in_a_room_that_is_not_open_yet_comes_again() -> None:
     assert core.version == 0
     core.handle(RoomOpened(VIEWS), 0.0)
     assert isinstance(answer(core, TrajectoryReceived(0, push)), Accepted)
+
+
+def test_a_rollout_in_a_room_that_cannot_be_opened_is_refused() -> None:
+    core, push = new_core(opened=False), rollout(make_collector(ROLLOUTS))
+    core.handle(RoomUnusable(KITCHEN, "it differs"), 0.0)
+    found = refused(core, push)
+    assert (found.reason, found.detail) == (Reason.DIGEST, "kitchen/1 cannot be made here: it differs")
+
+
+def test_only_explored_rooms_of_rollouts_that_fit_the_run_are_opened() -> None:
+    core, push = new_core(opened=False), rollout(make_collector(ROLLOUTS))
+    unexplored = replace(push, rooms=(RoomUsed(RoomId("kitchen", 2), "d1"),))
+    assert refused(core, unexplored).reason == Reason.STALE, "an actor whose learner was started again goes on"
+    other = replace(ROLLOUTS, rollout_steps=ROLLOUTS.rollout_steps + 1)
+    assert refused(core, rollout(make_collector(other))).reason == Reason.SHAPE
+    assert core.rooms_to_open() == [KITCHEN]
 
 
 def test_rooms_are_opened_as_soon_as_an_actor_has_explored_them() -> None:

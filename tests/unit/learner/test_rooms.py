@@ -8,7 +8,9 @@ import pytest
 
 from hoz_dist.errors import InvalidValueError
 from hoz_dist.nav.rooms import RoomId
+from hoz_dist.sim.catalogue import RoomDiffersError
 from learner import rooms as module
+from learner.events import RoomOpened, RoomUnusable
 from learner.rooms import RoomOpener, RoomSource
 from tests.waiting import until
 
@@ -41,7 +43,7 @@ def opened_by(rooms: RoomOpener, count: int) -> list[RoomId]:
     opened: list[RoomId] = []
 
     def all_there() -> bool:
-        opened.extend(views.room for views in rooms.opened())
+        opened.extend(news.views.room for news in rooms.news() if isinstance(news, RoomOpened))
         return len(opened) >= count
 
     until(all_there, "the rooms")
@@ -56,7 +58,7 @@ def test_rooms_are_opened_once_and_those_that_are_missing_are_rendered_first() -
         store.held.add(room)
 
     with opener(store, render) as rooms:
-        assert rooms.opened() == []
+        assert rooms.news() == []
         for room in (ONE, OTHER, ONE, OTHER):
             rooms.want(room)
         assert opened_by(rooms, 2) == [ONE, OTHER]
@@ -81,4 +83,35 @@ def test_a_room_that_cannot_be_opened_is_said_and_tried_again(
         rooms.want(ONE)
         assert opened_by(rooms, 1) == [ONE]
     assert tries == [ONE] * 3
-    assert caplog.text.count("cannot open the views of a room (The disk is full.); its rollouts wait") == 1
+    assert caplog.text.count("cannot open the views of kitchen/1 (The disk is full.); its rollouts wait") == 1
+
+
+@pytest.mark.parametrize("error", [InvalidValueError, RuntimeError])
+def test_a_room_that_fails_holds_up_no_other(error: type[Exception], caplog: pytest.LogCaptureFixture) -> None:
+    """Neither for the time until it is tried again, nor for good."""
+
+    def render(room: RoomId) -> None:
+        raise error(str(room))
+
+    with opener(FakeStore(OTHER), render) as rooms:
+        rooms.want(ONE)
+        rooms.want(OTHER)
+        assert opened_by(rooms, 1) == [OTHER]
+    assert "cannot open the views of kitchen/1" in caplog.text
+
+
+def test_a_room_that_is_made_otherwise_here_is_given_up(caplog: pytest.LogCaptureFixture) -> None:
+    def render(room: RoomId) -> None:
+        raise RoomDiffersError(str(room))
+
+    news: list[object] = []
+
+    def hear() -> bool:
+        news.extend(rooms.news())
+        return bool(news)
+
+    with opener(FakeStore(), render) as rooms:
+        rooms.want(ONE)
+        until(hear, "the failure")
+    assert news == [RoomUnusable(ONE, "kitchen/1")]
+    assert "now or later" in caplog.text
