@@ -109,8 +109,8 @@ def simulate_command(
 ) -> None:
     """Predict the speed, policy lag and load of a run with any number of actors.
 
-    A discrete-event simulation fed by measured costs; docs/scaling.md says how near it comes. 10,000 actors take about
-    a minute.
+    A discrete-event simulation fed by measured costs; docs/scaling.md says how near it comes. 10,000 actors take a
+    minute, or some where most of what they send is turned away.
     """
     from hoz_dist.atomic import check_writable, write_atomically
     from hoz_dist.cli.progress import Progress

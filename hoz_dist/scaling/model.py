@@ -50,6 +50,8 @@ class _Moment:
 
     now: float
     counted: Counted
+    sent: int
+    """Pushes that were sent to the learner."""
     actors: float
     """Seconds of the actors' cores."""
     used: dict[str, float]
@@ -100,17 +102,17 @@ class _Run:
         """Let it get under way, and measure it."""
         updates = max(LEAST_UPDATES, UPDATES_PER_ACTOR * self._setting.actors)
         before = int(WARM_UP * updates)
-        self._run_until(before, before + updates)
+        self._run_until(before, before + updates, LONGEST_S / 2)
         start, self._counted.lag_max = self._moment(), 0
-        self._run_until(before + updates, before + updates)
+        self._run_until(before + updates, before + updates, LONGEST_S)
         return self._prediction(start, self._moment())
 
-    def _run_until(self, pushed: int, last: int) -> None:
-        """Run until so many updates have been answered for good."""
+    def _run_until(self, pushed: int, last: int, longest: float) -> None:
+        """Run until so many updates have been answered for good, or it is so late, seconds."""
         self._until = pushed
-        while self._counted.pushed < pushed and self._env.now < LONGEST_S:
+        while self._counted.pushed < pushed and self._env.now < longest:
             self._goal = self._env.event()
-            self._env.run(self._goal | self._env.timeout(LONGEST_S - self._env.now))
+            self._env.run(self._goal | self._env.timeout(longest - self._env.now))
             if self._progress is not None:
                 self._progress(self._counted.pushed / last)
 
@@ -158,6 +160,7 @@ class _Run:
         return _Moment(
             self._env.now,
             replace(self._counted),
+            self._learner.sent,
             self._actors.used(),
             self._used_by(self._learner) | {"host": self._host.used() / self._setting.cores},
             [self._used_by(relay) for relay in self._samples],
@@ -187,7 +190,6 @@ class _Run:
             for name, used in after.items()
         ]
         part = self._learner.costs
-        tries = count["updates"] + count["stale"] + count["busy"] + count["resent"]
         cores = self._setting.cores if self._setting.one_host else self._setting.actors
         return Prediction(
             actors=self._setting.actors,
@@ -201,7 +203,7 @@ class _Run:
             resent=count["resent"] / pushed,
             actor_load=(end.actors - start.actors) / seconds / cores,
             relay_load=max(relays, default=None),
-            megabits_up=8e-6 * tries * part.bytes_up / seconds,
+            megabits_up=8e-6 * (end.sent - start.sent) * part.bytes_up / seconds,
             megabits_down=8e-6 * count["fetched"] * part.bytes_down / seconds,
             simulated_seconds=seconds,
             **loads,

@@ -125,6 +125,7 @@ class Node:
         receive_used: The same of the thread that receives pushes.
         serve_used: The same of the thread that serves parameters.
         lock_used: Seconds in which the interpreter lock was held.
+        sent: Pushes that were sent to it.
     """
 
     def __init__(self, place: Place, costs: Costs, *, clients: int, counted: Counted) -> None:
@@ -132,7 +133,7 @@ class Node:
         self.costs = costs
         self.counted = counted
         self._clients = clients
-        self.version = 0
+        self.version = self.sent = 0
         self.main_used = self.receive_used = self.serve_used = self.lock_used = 0.0
         self._lock = simpy.Resource(self.env)
         self._channel = simpy.Store(self.env)
@@ -147,6 +148,7 @@ class Node:
 
     def send(self, push: Push, size: float) -> simpy.Event:
         """Send a push; returns the event of its answer."""
+        self.sent += 1
         request = Request(push, self.env.event())
         sent = self.link.up.use(self.link.seconds(size))
         assert sent.callbacks is not None  # noqa: S101 - it has not happened yet

@@ -131,6 +131,12 @@ def test_relays_spare_the_learner_the_actors() -> None:
     assert helped.relay_load is not None
 
 
+def test_a_run_that_does_not_get_on_is_given_up() -> None:
+    found = simulate(costs(act=1.0), setting(bandwidth=1e3, actors=200))  # 32 s for each of 200 gradients
+    assert found.simulated_seconds == pytest.approx(1800, rel=0.5)
+    assert max(found.up_load, found.down_load) == pytest.approx(1.0, abs=0.01)
+
+
 def test_relays_stand_in_as_many_levels_as_it_takes() -> None:
     assert setting(actors=100).relays == ()
     assert setting(actors=10, fan_out=10).relays == ()
