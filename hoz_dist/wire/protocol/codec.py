@@ -49,8 +49,8 @@ _VERSION_FIRST: Final = b"\xa1v"
 """The text ``v`` as the first key of a map of up to 15 entries, whose header is one byte."""
 _LAST_FIXINT: Final = b"\x7f"
 """Numbers up to this are one byte, their own value."""
-_SPARE: Final = 16 * 1024
-"""Room for all but the tensors in the buffer that a message is packed into; it grows when that is not enough."""
+_USUAL_BYTES: Final = 16 * 1024
+"""Length of the buffer that a message without its bulk is packed into; it grows when that is not enough."""
 
 M = TypeVar("M", bound=Message)
 
@@ -71,9 +71,7 @@ def lay_out(message: Message) -> Layout:
         return tensor.description
 
     fields = {"v": PROTOCOL_VERSION, "kind": message.KIND, **message.pack()}
-    inside = sum(_tensor_bytes(value) for value in fields.values())
-    # A buffer that has to grow copies a large tensor several times.
-    head: bytes = msgpack.Packer(buf_size=inside + _SPARE, default=put_behind).pack(fields)
+    head: bytes = msgpack.Packer(buf_size=_USUAL_BYTES, default=put_behind).pack(fields)
     return Layout(head, tuple(bulk))
 
 
@@ -112,12 +110,6 @@ def decode(data: bytes, *expected: type[M]) -> M:
 def checksum(data: bytes | bytearray) -> bytes:
     """Return the checksum that travels with a payload: its xxh3_64, 8 bytes, big-endian."""
     return xxhash.xxh3_64_digest(data)
-
-
-def _tensor_bytes(packed: object) -> int:
-    """Return the length of the raw bytes of a packed field; 0 when it is no tensor."""
-    data = packed.get("data") if isinstance(packed, dict) else None
-    return data.nbytes if isinstance(data, memoryview) else 0
 
 
 def _check_version(version: object) -> None:

@@ -21,6 +21,7 @@ from hoz_dist.wire.transport.queryable import answer
 MOST_WAITING: Final = 32
 """The default of `RunConfig.max_lag`: a gradient that waits behind more than that is stale when its turn comes."""
 MOST_WAITING_BYTES: Final = 256 * 1024 * 1024
+"""Of the messages. They are in memory twice: Zenoh's query keeps what it received until it is answered."""
 LONGEST_WAIT_S: Final = 5.0
 """Half of what the sender waits for its answer at first: it hears ``busy`` before it gives the learner up."""
 _LOOK_EVERY_S: Final = 0.25
@@ -72,7 +73,8 @@ class Inbox:
 
     Args:
         most: Largest number of requests that wait.
-        most_bytes: Largest number of bytes of all that wait; one request may always wait.
+        most_bytes: Largest number of bytes of all messages that wait, half of the memory that they take; one request may
+            always wait.
         longest_wait_s: How long a request waits, seconds.
 
     Attributes:
