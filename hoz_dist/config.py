@@ -98,6 +98,9 @@ class RunConfig:
         if self.minutes is not None and self.frames is not None:
             message = "A run's budget is either minutes or frames; give one of them."
             raise InvalidValueError(message)
+        if self.learn_from == "rollouts" and self.compress != "fp32":
+            message = f"Rollouts are no gradients: leave out '{self.compress}' compression, or learn from gradients."
+            raise InvalidValueError(message)
 
     @property
     def policy(self) -> PolicySettings:

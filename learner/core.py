@@ -258,8 +258,8 @@ class LearnerCore:
         except RejectedError as error:
             yield self._refuse(request, error.reason, error.detail)
             return
-        if learnt.loss is not None:
-            self.statistics.losses = learnt.loss.terms()
+        if learnt.loss is not None and learnt.frames:
+            self.statistics.learnt(learnt.loss.terms())
         # V-trace has accounted for the lag already, and the gradient is of the parameters as they are.
         yield from self._apply(sender, push, learnt, 1.0, now)
         yield PublishParameters()

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from hoz_dist.config import RunConfig
-from hoz_dist.errors import ConnectionFailedError
+from hoz_dist.errors import ConnectionFailedError, InvalidValueError
 from hoz_dist.graph.matching import match
 from hoz_dist.policy.parameters import initial_parameters
 from hoz_dist.sim.catalogue import CATALOGUE_PATH
@@ -75,6 +75,16 @@ class LearnerSettings:
     """Where the views of rooms come from; needed by a run that learns from rollouts."""
     exit_when_done: bool = False
     """Return when the budget is used up; otherwise graphs go on being served."""
+
+    def __post_init__(self) -> None:
+        """Check what would leave every rollout waiting for ever.
+
+        Raises:
+            InvalidValueError: The run learns from rollouts, and there is nowhere to take the views of rooms from.
+        """
+        if self.config.learn_from == "rollouts" and self.rooms is None:
+            message = "A learner that learns from rollouts must see their rooms: give it a source of views."
+            raise InvalidValueError(message)
 
 
 def serve(settings: LearnerSettings, stop: threading.Event) -> None:

@@ -1,7 +1,7 @@
 """What the learner counts and measures: frames, success, lag, and each actor's part in them."""
 
 from collections import Counter, OrderedDict, deque
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final, NamedTuple
 
@@ -9,6 +9,8 @@ SUCCESS_WINDOW: Final = 1000
 """Episodes over which the success rate is taken."""
 LAG_WINDOW: Final = 1000
 """Applied gradients over which the lag is summed up."""
+LOSS_WINDOW: Final = 50
+"""Rollouts over which the terms of the loss are averaged, in a run that learns from them."""
 ACTOR_LAG_WINDOW: Final = 32
 """The same, for one actor."""
 RATE_SECONDS: Final = 30
@@ -84,11 +86,12 @@ class Statistics:
         self.recent: deque[tuple[str, bool]] = deque(recent, maxlen=SUCCESS_WINDOW)
         """(scene, success) of the last episodes."""
         self.losses: dict[str, float] = {}
-        """Terms of the loss as an actor last reported them, by name."""
+        """Terms of the loss by name: as an actor last reported them, or means over the last rollouts learnt from."""
         self.duplicates = 0
         """Pushes that were sent again although they had counted, since the process started."""
         self.actors: OrderedDict[tuple[str, int], ActorStatistics] = OrderedDict()
         """By name and incarnation: the speed of a process that left is not that of its successor."""
+        self._losses: deque[Mapping[str, float]] = deque(maxlen=LOSS_WINDOW)
         self._lags: deque[int] = deque(maxlen=LAG_WINDOW)
         self._rate = Rate()
 
@@ -112,6 +115,11 @@ class Statistics:
         statistics.frames += frames
         statistics.rate.add(now, frames)
         statistics.lags.append(lag)
+
+    def learnt(self, losses: Mapping[str, float]) -> None:
+        """Note the terms of a rollout's loss, which go up and down from one to the next."""
+        self._losses.append(losses)
+        self.losses = {name: sum(one[name] for one in self._losses) / len(self._losses) for name in losses}
 
     def finished(self, scene: str, *, success: bool) -> None:
         """Count a finished episode."""

@@ -1,6 +1,7 @@
 """A file of JSON lines that an actor writes on request."""
 
 import json
+import threading
 from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
@@ -10,7 +11,7 @@ from hoz_dist.errors import InvalidValueError
 
 
 class JsonLines(Closing):
-    """Appends JSON lines to a file, each flushed at once, so that a killed actor loses none.
+    """Appends JSON lines to a file, each flushed at once, so that a killed actor loses none; from any thread.
 
     Args:
         path: The file; made when it is not there.
@@ -23,6 +24,8 @@ class JsonLines(Closing):
     def __init__(self, path: Path, name: str) -> None:
         self._path = path
         self._name = name
+        self._whole = threading.Lock()
+        """Held while a line is written: two threads' must not run into each other."""
         try:
             self._file = path.open("a", encoding="utf-8")
         except OSError as error:
@@ -35,8 +38,9 @@ class JsonLines(Closing):
             InvalidValueError: The file cannot be written any more.
         """
         try:
-            self._file.write(json.dumps(line) + "\n")
-            self._file.flush()
+            with self._whole:
+                self._file.write(json.dumps(line) + "\n")
+                self._file.flush()
         except OSError as error:
             raise self._cannot_write(error) from error
 

@@ -22,6 +22,7 @@ def test_json_and_back() -> None:
         ({"learning_rate": -1.0}, InvalidValueError),
         ({"learning_rate": float("nan")}, InvalidValueError),
         ({"minutes": 1.0, "frames": 5}, InvalidValueError),
+        ({"learn_from": "rollouts", "compress": "topk"}, InvalidValueError),
         ({"batch": "64"}, InvalidValueError),
         ({"batch": True}, InvalidValueError),
         ({"seed": 0.5}, InvalidValueError),

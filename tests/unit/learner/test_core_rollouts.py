@@ -2,6 +2,7 @@
 
 import dataclasses
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -30,6 +31,7 @@ from learner.events import (
     TrajectoryReceived,
 )
 from learner.replay import Schedule, UpdateRecord
+from learner.rollout_gradients import Learnt
 from tests.unit.learner.making import answer, episodes, gradient, replies
 from tests.unit.workers.making import CONFIG, KITCHEN, make_collector, room_views, scene_graph
 from workers.collector import Collector
@@ -110,6 +112,7 @@ def test_a_rollout_of_which_nothing_is_known_moves_nothing() -> None:
     assert core.version == 1
     np.testing.assert_array_equal(core.parameters, before)
     assert core.statistics.frames == 0
+    assert core.statistics.losses == {}, "nothing is known of the loss either"
 
 
 @pytest.mark.parametrize("actors", [1, 17])
@@ -216,6 +219,22 @@ def test_what_the_rooms_cannot_have_held_is_refused_and_does_not_count() -> None
     wrong = replace(push, rooms=(replace(push.rooms[0], digest="d2"),))
     assert refused(core, wrong).reason == Reason.DIGEST
     assert isinstance(answer(core, TrajectoryReceived(0, push)), Accepted)
+
+
+def test_losses_are_means_over_rollouts(monkeypatch: pytest.MonkeyPatch) -> None:
+    core, actor = new_core(), make_collector(ROLLOUTS)
+    rollouts: Any = core._rollouts
+    learn, found = rollouts.learn, []
+
+    def noting(push: TrajectoryPush) -> Learnt:
+        found.append(learn(push))
+        return found[-1]  # type: ignore[no-any-return]
+
+    monkeypatch.setattr(rollouts, "learn", noting)
+    for sequence in range(3):
+        answer(core, TrajectoryReceived(0, rollout(actor, sequence)))
+    assert len({learnt.loss.policy for learnt in found}) == 3
+    assert core.statistics.losses["policy_loss"] == pytest.approx(np.mean([learnt.loss.policy for learnt in found]))
 
 
 def test_losses_are_those_that_were_computed_here() -> None:

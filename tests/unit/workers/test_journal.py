@@ -1,5 +1,7 @@
 import json
+import threading
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -9,6 +11,7 @@ from hoz_dist.wire.protocol.answers import Accepted
 from hoz_dist.wire.protocol.pushes import EpisodesPush, RoomGraphPush
 from tests import wire_samples as samples
 from workers.journal import Journal
+from workers.json_lines import JsonLines
 
 
 def test_every_acknowledged_push_is_a_line_as_soon_as_it_is_noted(tmp_path: Path) -> None:
@@ -38,3 +41,35 @@ def test_a_file_that_cannot_be_written_is_said_in_one_sentence(tmp_path: Path) -
         Journal(tmp_path)
     with Journal(Path("/dev/full")) as journal, pytest.raises(InvalidValueError, match="No space left on device"):
         journal.write(samples.gradient_push(), Accepted(1, 1), 1)
+
+
+def test_lines_of_two_threads_do_not_run_into_each_other(tmp_path: Path) -> None:
+    both = threading.Event()
+
+    class Watched:
+        """A file that is written slowly, and notices a second writer."""
+
+        def __init__(self, lines: JsonLines) -> None:
+            self._file: Any = lines._file
+            self._inside = 0
+
+        def write(self, text: str) -> None:
+            self._inside += 1
+            if self._inside > 1:
+                both.set()
+            both.wait(0.03)
+            self._file.write(text)
+            self._inside -= 1
+
+        def __getattr__(self, name: str) -> Any:
+            return getattr(self._file, name)
+
+    with JsonLines(tmp_path / "lines", "journal") as lines:
+        lines._file = Watched(lines)  # type: ignore[assignment]
+        threads = [threading.Thread(target=lines.write, args=({"n": n},)) for n in range(2)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+    assert not both.is_set()
+    assert len((tmp_path / "lines").read_text().splitlines()) == 2
