@@ -73,8 +73,8 @@ class Inbox:
 
     Args:
         most: Largest number of requests that wait.
-        most_bytes: Largest number of bytes of all messages that wait, half of the memory that they take; one request may
-            always wait.
+        most_bytes: Largest number of bytes of all messages that wait, half of the memory that they take; one may always
+            wait.
         longest_wait_s: How long a request waits, seconds.
 
     Attributes:
