@@ -7,7 +7,7 @@ from typing import get_args
 import numpy as np
 import pytest
 
-from hoz_dist.config import Compression
+from hoz_dist.config import Compression, RunConfig
 from hoz_dist.gradient_forms import INT8_BLOCK
 from hoz_dist.nav.rooms import RoomId
 from hoz_dist.waiting import FIRST_TRY_S, LONGER_TRIES
@@ -16,17 +16,23 @@ from hoz_dist.wire.client.parameters import FAST_S, MOST_UNDER_WAY
 from hoz_dist.wire.protocol.codec import MESSAGES, PROTOCOL_VERSION, checksum, decode, encode
 from hoz_dist.wire.protocol.deltas import Quantised, add
 from hoz_dist.wire.protocol.gradients import GradientField
+from hoz_dist.wire.protocol.graph_messages import RoomGraphReply, SceneGraphReply
 from hoz_dist.wire.protocol.keys import Keys
-from hoz_dist.wire.protocol.message import SHARD_ELEMENTS, SMALL_BYTES, Message
+from hoz_dist.wire.protocol.message import MAX_PARAMETERS, SHARD_ELEMENTS, SMALL_BYTES, Message
 from hoz_dist.wire.protocol.parameters import BLOCK, ParametersDelta, ParametersHead, ParametersShard, digest_of
+from hoz_dist.wire.protocol.pushes import EpisodesPush, GradientPush, RoomGraphPush
 from hoz_dist.wire.protocol.rejection import Reason
 from hoz_dist.wire.protocol.rejections import LOG_EVERY_S, MOST_LINES
+from hoz_dist.wire.protocol.run_messages import StatusReply
+from hoz_dist.wire.protocol.schema import MOST_CHARACTERS, MOST_ELEMENTS
+from hoz_dist.wire.protocol.trajectories import FRAME_BYTES, MAX_ROOMS
 from hoz_dist.wire.serving.bases import LONGEST_LIFE
 from hoz_dist.wire.serving.inbox import LONGEST_WAIT_S, MOST_WAITING, MOST_WAITING_BYTES
 from hoz_dist.wire.serving.versions import EXPIRES_S, HELD_S, MOST_BYTES, MOST_READERS, YIELDS_S
 from learner.deduplication import MAX_SENDERS, WINDOW
 from tests.wire_examples import BASE, EXAMPLES, GRADIENTS
 
+NUMBERS = ("no", "one", "two", "three", "four")
 DOCUMENT = (Path(__file__).parents[3] / "docs" / "wire-protocol.md").read_text(encoding="utf-8")
 
 
@@ -117,7 +123,7 @@ def test_the_documented_limits_are_those_of_the_code() -> None:
         assert f"At most {part.MOST_BYTES >> 10} KiB." in section(part.KIND)
     assert f"one for each {BLOCK} values" in DOCUMENT
     assert f"at every multiple of {LONGEST_LIFE} versions" in DOCUMENT
-    assert MOST_UNDER_WAY == 2, "two questions may be without their answer"
+    assert f"At most {NUMBERS[MOST_UNDER_WAY]} questions may be" in DOCUMENT
     assert f"longer than {1000 * FAST_S:g} ms" in DOCUMENT
     assert f"{MOST_WAITING} pushes and {MOST_WAITING_BYTES >> 20} MiB wait at the learner" in DOCUMENT
     assert f"one that waits {LONGEST_WAIT_S:g} s" in DOCUMENT
@@ -132,6 +138,24 @@ def test_the_documented_limits_are_those_of_the_code() -> None:
     assert f"{WINDOW} sequence numbers behind" in DOCUMENT
     assert f"the {MAX_SENDERS} senders" in DOCUMENT
     assert f"first one of each sender and reason in {LOG_EVERY_S:g} s, at most {MOST_LINES} lines" in DOCUMENT
+
+
+def test_the_documented_bounds_of_messages_are_those_of_the_code() -> None:
+    assert f"At most {GradientPush.MOST_BYTES:,} bytes" in section("gradient")
+    assert f"P ≤ {MAX_PARAMETERS:,}" in section("gradient")
+    assert f"{EpisodesPush.MOST_BYTES >> 10} KiB and {EpisodesPush.MOST_VALUES:,} values" in section("episodes")
+    assert f"At most {FRAME_BYTES} B (T + 1) bytes" in section("trajectory")
+    assert f"list of at most {MAX_ROOMS} maps" in section("trajectory")
+    assert f"At most {StatusReply.MOST_BYTES >> 20} MiB and {StatusReply.MOST_VALUES:,} values" in section("status")
+    for graphs in (RoomGraphPush, SceneGraphReply, RoomGraphReply):
+        assert f"{graphs.MOST_BYTES >> 20} MiB" in section(graphs.KIND)
+    assert f"at most {MOST_ELEMENTS} elements, texts at most {MOST_CHARACTERS} characters" in DOCUMENT
+
+
+@pytest.mark.parametrize("option", ["batch", "rollout_steps", "gradient_norm", "max_lag", "learn_from", "compress"])
+def test_what_of_the_configuration_actors_must_keep_to_is_documented(option: str) -> None:
+    assert option in RunConfig().to_json()
+    assert option in section("config")
 
 
 def test_the_documented_keys_are_those_of_the_code() -> None:
