@@ -11,7 +11,7 @@ class Reason(StrEnum):
     """The fixed list of reasons; a refusal carries one, and rejections are counted by them."""
 
     MALFORMED = "malformed"
-    """The bytes are not one msgpack map, or the selector cannot be read."""
+    """The bytes are not one msgpack map and the bulk that it tells of, or the selector cannot be read."""
     VERSION = "version"
     """The peer speaks another protocol version."""
     KIND = "kind"

@@ -187,6 +187,16 @@ class Tensor:
     DESCRIPTION: ClassVar[frozenset[str]] = frozenset({"dtype", "shape"})
     FIELDS: ClassVar[frozenset[str]] = DESCRIPTION | {"data"}
 
+    def __post_init__(self) -> None:
+        """Refuse bounds that `check` could not judge.
+
+        Raises:
+            ValueError: There are some for ``bfloat16``, which NumPy has only as bits.
+        """
+        if self.dtype == "bfloat16" and (self.low, self.high) != (-math.inf, math.inf):
+            message = "a tensor of bfloat16 has no bounds"
+            raise ValueError(message)
+
     def pack(self, value: NDArray[Any]) -> object:
         """Return the map of dtype, shape and raw bytes, the bytes as a view, so that msgpack makes the only copy.
 

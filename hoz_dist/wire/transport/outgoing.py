@@ -50,6 +50,7 @@ class Outgoing:
             shared = self._memory.gather(self._pieces(layout, digest), size)
             if shared is not None:
                 return Payload(shared, digest.digest())
+            # The memory is used again for equal lengths only, as those of shards are: Zenoh takes it as a whole.
             if len(self._buffer) != size:
                 self._buffer = bytearray(size)
             layout.write_into(memoryview(self._buffer))

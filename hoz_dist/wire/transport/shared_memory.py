@@ -55,10 +55,6 @@ class SharedMemory(Closing):
         self._outage = Outage(_log, "no shared memory (%s); sending bytes", "sending through shared memory again")
         self.on = on and self._has_room(0)
 
-    def wrap(self, payload: bytes) -> ZBytes:
-        """Return what to hand to Zenoh: the payload in shared memory, or the payload."""
-        return self.gather((payload,), len(payload)) or ZBytes(payload)
-
     def gather(self, pieces: Iterable[bytes | bytearray], size: int) -> ZBytes | None:
         """Copy pieces into shared memory, one behind the other.
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from zenoh import Query
+from zenoh import Query, ZBytes
 from zenoh.handlers import FifoChannel
 
 from hoz_dist.wire.client.parameters import ParametersFollower
@@ -37,12 +37,17 @@ LARGE = bytes(range(256)) * 4000
 KEY = "hoz/test/bulk"
 
 
+def wrapped(memory: SharedMemory, payload: bytes) -> ZBytes:
+    """A payload in shared memory, or as bytes."""
+    return memory.gather((payload,), len(payload)) or ZBytes(payload)
+
+
 def sending(session: Session, memory: SharedMemory, payload: bytes = LARGE) -> closing[Drain[Query]]:
     """Answer each question with a payload."""
 
     def answer(query: Query) -> None:
         with query:
-            query.reply(KEY, memory.wrap(payload))
+            query.reply(KEY, wrapped(memory, payload))
 
     return closing(Drain(session.declare_queryable(KEY, FifoChannel(4)), answer, "answers"))
 
@@ -90,7 +95,7 @@ def test_small_messages_and_those_of_who_does_not_want_it_are_plain(endpoint: st
 
 def test_a_pool_is_made_anew_for_larger_messages(memory: SharedMemory) -> None:
     for size in (LEAST_BYTES, 2**20, 2**20 + 1, 2**24, LEAST_BYTES):
-        assert memory.wrap(bytes(size)).as_shm() is not None
+        assert wrapped(memory, bytes(size)).as_shm() is not None
     assert (memory.shared, memory.fallbacks) == (5, 0)
 
 
@@ -98,11 +103,11 @@ def test_what_does_not_fit_goes_as_bytes_is_counted_and_said_once(
     memory: SharedMemory, caplog: pytest.LogCaptureFixture
 ) -> None:
     with caplog.at_level(logging.INFO):
-        held = [memory.wrap(LARGE) for _ in range(10)]
+        held = [wrapped(memory, LARGE) for _ in range(10)]
         assert [message.as_shm() is not None for message in held] == [True] * 3 + [False] * 7
         assert all(message.to_bytes() == LARGE for message in held)
         held.clear()
-        assert memory.wrap(LARGE).as_shm() is not None
+        assert wrapped(memory, LARGE).as_shm() is not None
         memory.close()
     assert (memory.shared, memory.fallbacks) == (4, 7)
     assert [record.message for record in caplog.records] == [
@@ -115,11 +120,11 @@ def test_what_does_not_fit_goes_as_bytes_is_counted_and_said_once(
 def test_without_room_in_the_system_there_is_none(
     memory: SharedMemory, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    memory.wrap(LARGE)
+    wrapped(memory, LARGE)
     monkeypatch.setattr(shared_memory, "RESERVE_BYTES", 2**60)
     assert not SharedMemory(on=True).on
-    assert memory.wrap(LARGE).as_shm() is not None  # it has its pool
-    assert memory.wrap(bytes(2**24)).as_shm() is None
+    assert wrapped(memory, LARGE).as_shm() is not None  # it has its pool
+    assert wrapped(memory, bytes(2**24)).as_shm() is None
     assert memory.fallbacks == 1
     assert "MB of /dev/shm are needed" in caplog.text
     monkeypatch.setattr(shared_memory, "_FOLDER", Path("/dev/shm/none"))  # noqa: S108
@@ -129,7 +134,7 @@ def test_without_room_in_the_system_there_is_none(
 def test_threads_may_share_one(memory: SharedMemory) -> None:
     def work() -> None:
         for _ in range(50):
-            assert memory.wrap(LARGE).to_bytes() == LARGE
+            assert wrapped(memory, LARGE).to_bytes() == LARGE
 
     threads = [threading.Thread(target=work) for _ in range(4)]
     for thread in threads:

@@ -18,6 +18,7 @@ from hoz_dist.wire.protocol.message import Message
 from hoz_dist.wire.protocol.pushes import EpisodesPush, GradientPush, RoomGraphPush
 from hoz_dist.wire.protocol.rejection import Reason, RejectedError
 from hoz_dist.wire.protocol.run_messages import ConfigReply
+from hoz_dist.wire.protocol.schema import Tensor
 from tests import wire_samples as samples
 from tests.mutations import joined, split
 
@@ -384,3 +385,8 @@ def test_damaged_messages_are_decoded_or_rejected(data: st.DataObject) -> None:
     cut = data.draw(st.integers(0, len(damaged)))
     only_rejects(bytes(damaged), *KINDS)
     only_rejects(bytes(damaged[:cut]), *KINDS)
+
+
+def test_a_spec_whose_bounds_could_not_be_judged_cannot_be_made() -> None:
+    with pytest.raises(ValueError, match="bfloat16 has no bounds"):
+        Tensor("bfloat16", rank=1, most=8, low=0.0)
