@@ -401,6 +401,14 @@ def test_a_recorded_order_gives_identical_parameters() -> None:
     assert second.status(0.0)["replay"] == {"applied": 4, "total": 4, "diverged": 0}
 
 
+def test_nothing_is_computed_from_a_gradient_whose_turn_has_not_come(monkeypatch: pytest.MonkeyPatch) -> None:
+    records = recorded(new_core(), gradient(0), gradient(1))
+    core = new_core(schedule=Schedule(records))
+    monkeypatch.setattr("learner.core.gradient_norm", lambda _: pytest.fail("it comes again and again"))
+    (reply,) = push(core, gradient(1))
+    assert isinstance(reply, Busy)
+
+
 def test_an_actor_that_the_recorded_run_did_not_have_is_told_whom_it_had() -> None:
     records = recorded(new_core(), gradient(0, actor="anna"), gradient(0, actor="ben", version=1))
     refusal = refused(new_core(schedule=Schedule(records)), gradient(0, actor="carl"))
