@@ -15,7 +15,7 @@ class Sender(NamedTuple):
     """One stream of numbered pushes."""
 
     kind: str
-    """Gradients, episodes and room graphs are numbered apart."""
+    """Gradients, rollouts, episodes and room graphs are numbered apart."""
     actor: str
     incarnation: int
     """Differs each time that the actor's process starts."""

@@ -1,1 +1,1 @@
-"""A3C's arithmetic: rollouts, returns, loss and gradients. Knows of no environment, network or wire."""
+"""A3C's arithmetic: rollouts, returns, loss, and the gradients of a policy. Knows of no environment and no wire."""

@@ -17,11 +17,16 @@ from hoz_dist.wire.protocol.message import MAX_EPISODES
 from learner.checkpoint import Checkpoint, load_checkpoint
 from learner.deduplication import SeenPushes, Sender
 from learner.replay import read_updates
-from tests.campaigns.journals import Acknowledged
+from tests.campaigns.journals import LEARNT_FROM, Acknowledged
 
 Identity = tuple[str, int, int]
-"""Actor, incarnation and sequence number of a gradient."""
-_KINDS: Final = {"gradient": "gradient", "episodes": "episodes", "room_graph_push": "room"}
+"""Actor, incarnation and sequence number of a gradient, or of a rollout in a run that learns from them."""
+_KINDS: Final = {
+    "gradient": "gradient",
+    "trajectory": "trajectory",
+    "episodes": "episodes",
+    "room_graph_push": "room",
+}
 """What the table of seen pushes calls the kinds of messages."""
 
 
@@ -71,9 +76,9 @@ def audit(run: Path, pushes: Sequence[Acknowledged]) -> Audit:
     epochs, checkpoint = _epochs(run), load_checkpoint(run)
     record = Counter(_joined(epochs))
     covered = [push for push in pushes if _is_covered(push, _bound(push.epoch, epochs, checkpoint))]
-    gradients = [push for push in covered if push.kind == "gradient"]
-    lost = sorted(set(pushes).difference(covered, (push for push in pushes if push.kind != "gradient")))
-    told = {_identity(push) for push in pushes if push.kind == "gradient"}
+    gradients = [push for push in covered if push.kind in LEARNT_FROM]
+    lost = sorted(set(pushes).difference(covered, (push for push in pushes if push.kind not in LEARNT_FROM)))
+    told = {_identity(push) for push in pushes if push.kind in LEARNT_FROM}
     figures = AuditFigures(
         epochs=len(epochs),
         version=checkpoint.version,
@@ -121,7 +126,7 @@ def _bound(epoch: int, epochs: Sequence[_Epoch], checkpoint: Checkpoint) -> int:
 
 
 def _is_covered(push: Acknowledged, bound: int) -> bool:
-    return push.version < bound or (push.version == bound and push.kind == "gradient")
+    return push.version < bound or (push.version == bound and push.kind in LEARNT_FROM)
 
 
 def _longest_span(lost: Iterable[Acknowledged]) -> float:
@@ -174,15 +179,17 @@ def _miscounted(
     Of a push whose actor was killed before it heard of it nobody wrote down how much it counted, only
     that it was taken.
     """
-    frames = {_identity(push): push.frames for push in pushes if push.kind == "gradient"}
-    known = sum(frames.get(identity, 0) for identity in record)
+    frames = {_identity(push): push.frames for push in pushes if push.kind in LEARNT_FROM}
+    most = sum(frames.get(identity, 0) for identity in record)
+    # Of a rollout the learner counts the steps at which it knows the state; all, unless a learner was replaced.
+    least = 0 if any(push.kind == "trajectory" for push in pushes) else most
     most_frames = checkpoint.config.batch * checkpoint.config.rollout_steps
     unknown = sum(identity not in frames for identity in record)
     least_episodes = sum(push.episodes for push in covered)
     most_episodes = sum(push.episodes for push in pushes) + MAX_EPISODES * _unheard_episodes(pushes, checkpoint)
     problems = []
-    if not known <= checkpoint.frames <= known + unknown * most_frames:
-        problems.append(f"{checkpoint.frames} frames were counted, not {known} and those of {unknown} gradients")
+    if not least <= checkpoint.frames <= most + unknown * most_frames:
+        problems.append(f"{checkpoint.frames} frames were counted, not {most} and those of {unknown} pushes")
     if not least_episodes <= checkpoint.episodes <= most_episodes:
         problems.append(f"{checkpoint.episodes} episodes were counted, not {least_episodes} to {most_episodes}")
     return problems

@@ -15,6 +15,8 @@ SHARE: Final = 0.8
 LASTING_S: Final = 3.0
 """A single good window is not enough: the mean over so long must be good as well."""
 STEP_S: Final = 0.1
+LEARNT_FROM: Final = frozenset({"gradient", "trajectory"})
+"""Kinds of pushes that make a version of the parameters; a run has one of them."""
 
 
 class Acknowledged(NamedTuple):
@@ -31,7 +33,7 @@ class Acknowledged(NamedTuple):
     version: int
     """Version of the parameters at the answer, so not less than the one that a gradient made."""
     frames: int = 0
-    """Of a gradient."""
+    """Of a gradient or a rollout."""
     episodes: int = 0
     """Number of them."""
 
@@ -54,7 +56,7 @@ class FrameRate:
     """
 
     def __init__(self, pushes: Iterable[Acknowledged]) -> None:
-        gradients = sorted((push.time, push.frames) for push in pushes if push.kind == "gradient")
+        gradients = sorted((push.time, push.frames) for push in pushes if push.kind in LEARNT_FROM)
         self._times: NDArray[np.float64] = np.array([time for time, _ in gradients])
         self._sums: NDArray[np.float64] = np.concatenate(([0.0], np.cumsum([frames for _, frames in gradients])))
 
@@ -90,5 +92,5 @@ class FrameRate:
 
 def first_of(pushes: Sequence[Acknowledged], actor: str, after: float) -> float | None:
     """Return how long after a time an actor's first gradient was acknowledged, seconds; None when none was."""
-    times = [push.time for push in pushes if push.actor == actor and push.kind == "gradient" and push.time > after]
+    times = [push.time for push in pushes if push.actor == actor and push.kind in LEARNT_FROM and push.time > after]
     return min(times) - after if times else None

@@ -24,7 +24,9 @@ def gradient(sequence: int, epoch: int, version: int) -> Acknowledged:
     return Acknowledged("anna", 0.0, "gradient", 7, sequence, epoch, version, 20)
 
 
-def write_run(run: Path, epochs: Sequence[tuple[int, Sequence[int]]], seen: Sequence[int]) -> None:
+def write_run(
+    run: Path, epochs: Sequence[tuple[int, Sequence[int]]], seen: Sequence[int], kind: str = "gradient"
+) -> None:
     """Write a run: of each epoch the version that it began from and the sequence numbers that it applied."""
     (run / "updates").mkdir(parents=True)
     for number, (version, sequences) in enumerate(epochs, start=1):
@@ -35,7 +37,7 @@ def write_run(run: Path, epochs: Sequence[tuple[int, Sequence[int]]], seen: Sequ
         (run / "updates" / f"epoch-{number:04d}.jsonl").write_text(text)
     table, vector = SeenPushes(), np.zeros(3, np.float32)
     for sequence in seen:
-        table.add(Sender("gradient", "anna", 7), sequence)
+        table.add(Sender(kind, "anna", 7), sequence)
     version = epochs[-1][0] + len(epochs[-1][1])
     checkpoint = Checkpoint(
         config=RunConfig(),
@@ -78,6 +80,26 @@ def test_the_audit_finds_an_acknowledged_gradient_that_is_not_in_the_record(tmp_
     problems = audit(tmp_path, [gradient(0, 1, 1), gradient(1, 1, 2)]).figures.problems
     assert len(problems) == 1
     assert "counts 0 times" in problems[0]
+
+
+@pytest.mark.parametrize(("frames", "problems"), [(20, 0), (30, 0), (19, 1)])
+def test_rollouts_count_once_and_for_no_more_frames_than_they_have(tmp_path: Path, frames: int, problems: int) -> None:
+    write_run(tmp_path, [(0, [0, 1]), (1, [2])], seen=[0, 2], kind="trajectory")
+    pushes = [
+        gradient(sequence, epoch, version)._replace(kind="trajectory", frames=frames)
+        for sequence, epoch, version in ((0, 1, 1), (1, 1, 2), (2, 2, 2))
+    ]
+    figures, _, lasting = audit(tmp_path, pushes)
+    assert [push.sequence for push in lasting] == [0, 2]
+    assert figures.lost_with_their_learner == 1
+    assert len(figures.problems) == problems
+    assert FrameRate(pushes).between(-1.0, 1.0) == 1.5 * frames
+
+
+def test_the_audit_finds_a_rollout_that_was_forgotten(tmp_path: Path) -> None:
+    write_run(tmp_path, [(0, [0, 2])], seen=[0], kind="trajectory")
+    pushes = [gradient(sequence, 1, sequence + 1)._replace(kind="trajectory") for sequence in (0, 1)]
+    assert len([problem for problem in audit(tmp_path, pushes).figures.problems if "counts 0 times" in problem]) == 1
 
 
 def test_the_audit_finds_a_gradient_that_counts_twice(tmp_path: Path) -> None:
