@@ -29,7 +29,7 @@ DEFAULT_ACTORS: Final = ("1,10,100,1000,10000",)
 @click.option("--preset", default="compact", show_default=True, help="Whose measured costs: compact or paper.")
 @click.option(
     "--costs",
-    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    type=click.Path(dir_okay=False, path_type=Path),
     metavar="FILE",
     help="Costs that `hoz-dist bench train --costs FILE` measured.  [default: those shipped for the preset]",
 )
