@@ -81,8 +81,7 @@ class ViewStore:
             rooms: Gives the content of a room; the catalogue if None.
         """
         self._load_room = cache(rooms or load_room)
-        # Making a room takes ten times as long as opening its views; what is in the cache needs its digest alone.
-        self._digest_of = recorded_digest if rooms is None else lambda room: self._load_room(room).digest
+        self._from_catalogue = rooms is None
         self._opened: dict[RoomId, ViewFolder] = {}
         self._cache = default_cache() if folder is None else folder
         self._size = picture_size
@@ -184,6 +183,10 @@ class ViewStore:
             return ViewFolder.open(path, self._size)
         except DamagedFileError:
             return ViewFolder.create(path, painter.pose_graph(), self._size)
+
+    def _digest_of(self, room: RoomId) -> str:
+        # Making a room takes ten times as long as opening its views; what is in the cache needs its digest alone.
+        return recorded_digest(room) if self._from_catalogue else self._load_room(room).digest
 
     def _path(self, room: RoomId) -> Path:
         """Return the folder for a room's pictures: its name holds the digest of all that shapes them."""
