@@ -15,6 +15,7 @@ from hoz_dist.nav.rooms import RoomId
 from hoz_dist.sim.catalogue import RoomDiffersError
 from hoz_dist.sim.room_views import RoomViews
 from hoz_dist.sim.view_store import ViewStore
+from learner.checkpoint import Checkpoint
 from learner.events import RoomOpened, RoomUnusable
 
 RETRY_S: Final = 5.0
@@ -62,6 +63,11 @@ class RoomOpener(Closing):
         if room not in self._asked:
             self._asked.add(room)
             self._wanted.put(room)
+
+    def want_those_of(self, checkpoint: Checkpoint) -> None:
+        """Open the rooms of a run before this process leads it, so that its actors need not wait for them."""
+        for room in checkpoint.rooms:
+            self.want(RoomId.parse(room.room))
 
     def news(self) -> list[RoomOpened | RoomUnusable]:
         """Return what became of rooms since the last call."""

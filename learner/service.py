@@ -28,7 +28,7 @@ from learner.leadership import DeposedError, Leadership
 from learner.log_file import logged_to
 from learner.replay import Schedule, read_updates
 from learner.rollout_gradients import RolloutGradients
-from learner.rooms import RoomSource
+from learner.rooms import RoomOpener, RoomSource
 from learner.run_folder import RunFolder
 from learner.serving import Learner
 from learner.standby import RETRY_S, ReadAhead, follow
@@ -102,12 +102,13 @@ def serve(settings: LearnerSettings, stop: threading.Event) -> None:
         suppress(StoppedError),
         SharedMemory(on=settings.shared_memory, messages=SHARDS_SHARED) as memory,
         _opened(settings, memory, stop) as session,
+        nullcontext() if settings.rooms is None else RoomOpener(settings.rooms) as rooms,
     ):
         folder.make()
-        ahead = ReadAhead(folder.checkpoints)
+        ahead = ReadAhead(folder.checkpoints, rooms.want_those_of if rooms is not None else None)
         leadership = None if settings.standby else folder.claim_or_refuse(ahead.read)
         with leadership or nullcontext(), logged_to(folder.log, settings.name), Members(session, keys) as members:
-            _Turns(settings, folder, session, keys, members, cores, memory).take(leadership, ahead, stop)
+            _Turns(settings, folder, session, keys, members, cores, memory, rooms).take(leadership, ahead, stop)
 
 
 class _Cores:
@@ -153,6 +154,7 @@ class _Turns:
         members: Members,
         cores: _Cores,
         memory: SharedMemory,
+        rooms: RoomOpener | None = None,
     ) -> None:
         self._settings = settings
         self._folder = folder
@@ -161,6 +163,7 @@ class _Turns:
         self._members = members
         self._cores = cores
         self._memory = memory
+        self._rooms = rooms
         self._incarnation = secrets.randbits(48)
 
     def take(self, leadership: Leadership | None, ahead: ReadAhead, stop: threading.Event) -> None:
@@ -187,13 +190,15 @@ class _Turns:
                 if not follows:
                     raise
                 _log.warning("%s This standby goes on trying.", error)
-                leadership, ahead = None, ReadAhead(self._folder.checkpoints)
+                leadership = None
+                ahead.forget()
                 stop.wait(RETRY_S)
                 continue
             _log.warning("deposed: another learner leads run %s after epoch %d", self._keys.run, leadership.epoch)
             if self._settings.connect is None:
                 raise DeposedError(self._folder.path, leadership.epoch)
-            leadership, ahead = None, ReadAhead(self._folder.checkpoints)
+            leadership = None
+            ahead.forget()
 
     def _follow(self, ahead: ReadAhead, stop: threading.Event) -> Leadership | None:
         """Follow the leader; return the right to lead, or None when ``stop`` was set."""
@@ -216,9 +221,7 @@ class _Turns:
                 *(self._keys.run, core.epoch, core.version, core.parameters.size),
                 f"listening at {settings.listen}" if settings.listen else f"connected to {settings.connect}",
             )
-            with Learner(
-                core, run, self._session, self._keys, self._members, me, self._memory, settings.rooms
-            ) as learner:
+            with Learner(core, run, self._session, self._keys, self._members, me, self._memory, self._rooms) as learner:
                 learner.run(stop, exit_when_done=settings.exit_when_done)
             return learner.deposed
 

@@ -54,7 +54,7 @@ from learner.events import (
 from learner.leadership import DeposedError
 from learner.membership import left_processes, live_processes
 from learner.recorder import ScalarRecorder, UpdateLog
-from learner.rooms import RoomOpener, RoomSource
+from learner.rooms import RoomOpener
 from learner.run_folder import LedRun
 
 TICK_S: Final = 0.1
@@ -84,7 +84,7 @@ class Learner:
         members: Who takes part.
         me: This process, as the others see it.
         memory: Shared memory for parameters.
-        rooms: Where the views of rooms come from, if the run learns from rollouts.
+        rooms: Opens rooms, if the run learns from rollouts; stays open.
     """
 
     def __init__(
@@ -96,7 +96,7 @@ class Learner:
         members: Members,
         me: Member,
         memory: SharedMemory | None = None,
-        rooms: RoomSource | None = None,
+        rooms: RoomOpener | None = None,
     ) -> None:
         self._core = core
         self._leadership = run.leadership
@@ -113,7 +113,7 @@ class Learner:
         self._updates_disk = Outage(_log, "cannot record updates (%s); training on", "updates are recorded again")
         self._scalars_disk = Outage(_log, "cannot log to TensorBoard (%s); training on", "logging to TensorBoard again")
         with ExitStack() as stack:
-            self._rooms = stack.enter_context(RoomOpener(rooms)) if rooms is not None else None
+            self._rooms = rooms
             for room in core.rooms_to_open():
                 self._open_room(room)
             self._updates = UpdateLog(run.updates)

@@ -85,10 +85,12 @@ class ReadAhead:
 
     Args:
         folder: The folder of checkpoints.
+        heard: Told of each checkpoint that was read.
     """
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, heard: Callable[[Checkpoint], None] | None = None) -> None:
         self._folder = folder
+        self._heard = heard
         self._identity: tuple[object, ...] = ()
         self._checkpoint: Checkpoint | None = None
 
@@ -106,7 +108,13 @@ class ReadAhead:
         identity = _identity(path)
         if self._checkpoint is None or identity != self._identity:
             self._checkpoint, self._identity = load_checkpoint(path), identity
+            if self._heard is not None:
+                self._heard(self._checkpoint)
         return self._checkpoint
+
+    def forget(self) -> None:
+        """Read anew next time, whatever was read before."""
+        self._checkpoint, self._identity = None, ()
 
 
 def follow(

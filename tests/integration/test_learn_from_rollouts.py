@@ -1,4 +1,4 @@
-"""A real learner that learns from the rollouts of a real actor, in rooms that it renders itself."""
+"""A real learner that learns from the rollouts of a real actor, and is killed."""
 
 import signal
 from pathlib import Path
@@ -8,19 +8,23 @@ import pytest
 from hoz_dist.client import HozClient
 from learner.checkpoint import load_checkpoint
 from learner.replay import read_updates
+from tests.campaigns.audit import audit
+from tests.campaigns.journals import read_journal
 from tests.integration.commands import SMALL_ROOMS, HozDist
 from tests.integration.learning import LearnerProcess, status_when, wait_for_checkpoint
 
 pytestmark = pytest.mark.integration
 
 
-def test_a_learner_with_its_own_rooms_learns_from_rollouts_and_goes_on_after_it_was_killed(
+def test_what_was_acknowledged_counts_once_though_the_learner_was_killed_and_goes_on(
     free_port: int, tmp_path: Path, cache: Path
 ) -> None:
     run = tmp_path / "run"
-    options = ("--learn-from", "rollouts", "--cache", str(tmp_path / "own"), "--checkpoint-seconds", "1")
+    options = ("--learn-from", "rollouts", "--cache", str(cache), "--checkpoint-seconds", "1")
+    journal = tmp_path / "anna.jsonl"
     with LearnerProcess(free_port, run, *options).ready() as learner:
         actor_words = ("actor", "--scene", SMALL_ROOMS[0], "--connect", learner.endpoint, "--name", "anna")
+        actor_words += ("--journal", str(journal))
         with HozDist(*actor_words, "--cache", str(cache), log=tmp_path / "anna.log") as actor:
             with HozClient(learner.endpoint) as client:
                 status = status_when(client, lambda status: status["version"] > 3 and status["episodes"] > 0)
@@ -43,3 +47,6 @@ def test_a_learner_with_its_own_rooms_learns_from_rollouts_and_goes_on_after_it_
     resumed = load_checkpoint(run)
     assert resumed.version > saved.version
     assert len(read_updates(run)) == resumed.version
+    figures = audit(run, read_journal(journal)).figures
+    assert figures.problems == []
+    assert figures.covered["trajectory"] > saved.version

@@ -12,6 +12,7 @@ from hoz_dist.sim.catalogue import RoomDiffersError
 from learner import rooms as module
 from learner.events import RoomOpened, RoomUnusable
 from learner.rooms import RoomOpener, RoomSource
+from tests.unit.learner.making import room_graph
 from tests.waiting import until
 
 ONE, OTHER = RoomId("kitchen", 1), RoomId("kitchen", 2)
@@ -115,3 +116,12 @@ def test_a_room_that_is_made_otherwise_here_is_given_up(caplog: pytest.LogCaptur
         until(hear, "the failure")
     assert news == [RoomUnusable(ONE, "kitchen/1")]
     assert "now or later" in caplog.text
+
+
+def test_the_rooms_of_a_checkpoint_are_opened_before_its_run_is_led() -> None:
+    checkpoint: Any = SimpleNamespace(rooms=(room_graph(str(OTHER)), room_graph(str(ONE))))
+    with opener(FakeStore(ONE, OTHER), lambda _: None) as rooms:
+        rooms.want_those_of(checkpoint)
+        rooms.want_those_of(checkpoint)
+        assert opened_by(rooms, 2) == [OTHER, ONE]
+        assert rooms.news() == []

@@ -102,7 +102,8 @@ def saved(folder: Path, updates: int, epoch: int = 1) -> Path:
 def test_a_checkpoint_is_read_ahead_and_again_only_when_it_is_another(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    ahead = ReadAhead(tmp_path)
+    heard: list[int] = []
+    ahead = ReadAhead(tmp_path, lambda checkpoint: heard.append(checkpoint.version))
     ahead.refresh()  # there is none
     first = saved(tmp_path, 1)
     ahead.refresh()
@@ -118,6 +119,12 @@ def test_a_checkpoint_is_read_ahead_and_again_only_when_it_is_another(
     ahead.refresh()
     assert ahead.read(second).version == 2
     np.testing.assert_array_equal(ahead.read(first).parameters, before.parameters)
+    assert heard == [1, 1, 2, 1], "whoever gets ready for the run hears of each"
+    ahead.forget()
+    ahead.refresh()
+    assert heard[4:] == [], "the newest one is damaged"
+    ahead.read(first)
+    assert heard[4:] == [1]
 
 
 def test_following_ends_with_the_leadership_of_the_next_epoch(tmp_path: Path) -> None:
