@@ -23,9 +23,9 @@ def test_what_was_acknowledged_counts_once_though_the_learner_was_killed_and_goe
     options = ("--learn-from", "rollouts", "--cache", str(cache), "--checkpoint-seconds", "1")
     journal = tmp_path / "anna.jsonl"
     with LearnerProcess(free_port, run, *options).ready() as learner:
-        actor_words = ("actor", "--scene", SMALL_ROOMS[0], "--connect", learner.endpoint, "--name", "anna")
-        actor_words += ("--journal", str(journal))
-        with HozDist(*actor_words, "--cache", str(cache), log=tmp_path / "anna.log") as actor:
+        words = ("actor", "--scene", SMALL_ROOMS[0], "--connect", learner.endpoint, "--name", "anna")
+        files = ("--journal", str(journal), "--cache", str(cache))
+        with HozDist(*words, *files, log=tmp_path / "anna.log") as actor:
             with HozClient(learner.endpoint) as client:
                 status = status_when(client, lambda status: status["version"] > 3 and status["episodes"] > 0)
             assert status["rejected"] == {}
