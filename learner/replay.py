@@ -2,7 +2,7 @@
 
 Two runs are identical only when the same gradients are applied in the same order with the same learning rates, which
 under asynchronous training depends on timing. So the learner writes down each applied update, and with ``--replay``
-applies gradients in the order of such a record.
+applies gradients, or learns from rollouts, in the order of such a record.
 
 Each epoch has a file of its own, ``updates/epoch-0002.jsonl``, so that a learner that was deposed and does not know it
 yet cannot write into the record of the next one. Its first line names the epoch and the version that it began from;

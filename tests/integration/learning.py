@@ -195,9 +195,12 @@ def wait_for_checkpoint(run: Path, version: int) -> None:
 
 
 def status_when(client: HozClient, wanted: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
-    """Ask for the status until it is as wanted."""
+    """Ask for the status until it is as wanted.
+
+    A push that went with its learner is waited for 10 s, and 20 s if the next try is lost as well; this waits longer.
+    """
     pause = threading.Event()
-    for _ in range(300):
+    for _ in range(600):
         status = client.status()
         if wanted(status):
             return status
