@@ -217,12 +217,8 @@ class LearnerCore:
 
     def _gradient(self, request: int, push: GradientPush, now: float) -> Iterator[Effect]:
         sender = Sender("gradient", push.actor, push.incarnation)
-        if (sender, push.sequence) in self._seen:
-            yield self._repeated(request)
-            return
-        refusal = self._admission.refusal(push, self.version, finished=self.finished)
-        if refusal is not None:
-            yield self._refuse(request, *refusal)
+        if (settled := self._settled(request, sender, push)) is not None:
+            yield settled
             return
         if self._schedule is not None and self._schedule.turn(push.actor, push.sequence) == "later":
             yield Reply(request, Busy(self.epoch))
@@ -238,14 +234,17 @@ class LearnerCore:
         yield PublishParameters()
         yield Reply(request, self._accepted())
 
+    def _settled(self, request: int, sender: Sender, push: GradientPush | TrajectoryPush) -> Reply | None:
+        """Return the answer to a push that counted before, or that cannot be used; None when it may be."""
+        if (sender, push.sequence) in self._seen:
+            return self._repeated(request)
+        refusal = self._admission.refusal(push, self.version, finished=self.finished)
+        return None if refusal is None else self._refuse(request, *refusal)
+
     def _trajectory(self, request: int, push: TrajectoryPush, now: float) -> Iterator[Effect]:
         sender = Sender("trajectory", push.actor, push.incarnation)
-        if (sender, push.sequence) in self._seen:
-            yield self._repeated(request)
-            return
-        refusal = self._admission.refusal(push, self.version, finished=self.finished)
-        if refusal is not None:
-            yield self._refuse(request, *refusal)
+        if (settled := self._settled(request, sender, push)) is not None:
+            yield settled
             return
         assert self._rollouts is not None  # noqa: S101 - otherwise it was refused
         try:
