@@ -13,7 +13,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final
 
 from hoz_dist.a3c.compression.decompressor import Decompressor
-from hoz_dist.a3c.norm import gradient_norm
 from hoz_dist.config import RunConfig
 from hoz_dist.errors import InvalidValueError
 from hoz_dist.gradient_forms import Vector
@@ -223,14 +222,13 @@ class LearnerCore:
         if self._schedule is not None and self._schedule.turn(push.actor, push.sequence) == "later":
             yield Reply(request, Busy(self.epoch))
             return
-        vector = self._decompressor.vector(push.gradient)
-        norm, bound = gradient_norm(vector), self.config.gradient_norm
+        vector, norm = self._decompressor.decompress(push.gradient, lag_weight(self.version - push.version))
+        bound = self.config.gradient_norm
         # Actors scale their gradients down; what exceeds the bound by more than rounding is not one of theirs.
         if norm > bound * (1.0 + NORM_TOLERANCE):
             yield self._refuse(request, Reason.NORM, f"norm {norm:.6g}, the bound is {bound:g}")
             return
-        weight = lag_weight(self.version - push.version)
-        yield from self._apply(sender, push, Learnt(vector, push.frames), weight, now)
+        yield from self._apply(sender, push, Learnt(vector, push.frames), now)
         yield PublishParameters()
         yield Reply(request, self._accepted())
 
@@ -260,12 +258,12 @@ class LearnerCore:
         if learnt.loss is not None and learnt.frames:
             self.statistics.learnt(learnt.loss.terms())
         # V-trace has accounted for the lag already, and the gradient is of the parameters as they are.
-        yield from self._apply(sender, push, learnt, 1.0, now)
+        yield from self._apply(sender, push, learnt, now)
         yield PublishParameters()
         yield Reply(request, self._accepted())
 
     def _apply(
-        self, sender: Sender, push: GradientPush | TrajectoryPush, learnt: Learnt, weight: float, now: float
+        self, sender: Sender, push: GradientPush | TrajectoryPush, learnt: Learnt, now: float
     ) -> Iterator[Effect]:
         lag = self.version - push.version
         self._clock.push(now)
@@ -273,7 +271,7 @@ class LearnerCore:
         if self._schedule is not None:
             self._optimizer.learning_rate = self._schedule.take(push.version)
         if learnt.frames:  # Adam would make a full step of a rollout of which nothing is known
-            self._optimizer.step(learnt.gradient, weight)
+            self._optimizer.step(learnt.gradient)
         self._seen.add(sender, push.sequence)
         self.version += 1
         self.statistics.applied(push.actor, push.incarnation, learnt.frames, lag, now)

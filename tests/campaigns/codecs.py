@@ -69,11 +69,11 @@ def train(config: RunConfig, rooms: Sequence[RoomId], actors: int, updates: int)
     for update in range(updates):
         if len(waiting) == actors:
             actor, version, gradient = waiting.popleft()
-            vector = decompressor.vector(compressors[actor].compress(gradient, version))
+            sent = compressors[actor].compress(gradient, version)
             compressors[actor].accepted()
-            errors[actor] += gradient - vector
+            errors[actor] += gradient - decompressor.decompress(sent).vector
             adam.set_progress(update / updates)
-            adam.step(vector, lag_weight(actors - 1))
+            adam.step(decompressor.decompress(sent, lag_weight(actors - 1)).vector)
         actor = update % actors
         collectors[actor].parameters.load(adam.parameters)
         rollout = collectors[actor].roll_out()

@@ -1,51 +1,74 @@
 """What the learner makes of a gradient that it received."""
 
-from typing import Final
+import math
+from collections.abc import Iterator
+from typing import Final, NamedTuple
 
 import numpy as np
 import torch
 
 from hoz_dist.a3c.compression.borrowing import borrowed
+from hoz_dist.a3c.norm import PIECE, gradient_norm, squares_of
 from hoz_dist.gradient_forms import INT8_BLOCK, Bf16Gradient, Gradient, Int8Gradient, TopKGradient, Vector
 
-_ROWS: Final = 512
-"""Blocks of an `Int8Gradient` that are worked on at once: they stay in the cache."""
+_BLOCKS: Final = PIECE // INT8_BLOCK
+
+
+class Decompressed(NamedTuple):
+    """A gradient as the optimiser takes it."""
+
+    vector: Vector
+    """Its entries times the weight, [P]; valid until the next gradient, read-only perhaps."""
+    norm: float
+    """Euclidean norm of the gradient itself, without the weight."""
 
 
 class Decompressor:
-    """Turns gradients of any form into vectors.
+    """Turns gradients of any form into vectors, and takes their norm while they are in the cache.
 
     Args:
         size: P, number of entries.
     """
 
     def __init__(self, size: int) -> None:
-        self._size = size
-        self._vector = np.empty(0, np.float32)
+        self._vector = np.zeros(size, np.float32)
 
-    def vector(self, gradient: Gradient) -> Vector:
-        """Return the entries of a gradient, [P].
+    def decompress(self, gradient: Gradient, weight: float = 1.0) -> Decompressed:
+        """Return the entries of a gradient and its norm.
 
         Args:
-            gradient: Of P entries, as checked when it was received.
-
-        Returns:
-            Valid until the next call; the gradient itself, read-only perhaps, if it is in full.
+            gradient: Of P entries, finite, as checked when it was received; left as it is.
+            weight: Factor of the entries, from 0 (excluded) to 1.
         """
-        if isinstance(gradient, np.ndarray):
-            return gradient
-        if self._vector.size == 0:
-            self._vector = np.zeros(self._size, np.float32)
-        vector = torch.from_numpy(self._vector)
+        match gradient:
+            case TopKGradient(_, indices, halves):
+                values = _numbers(halves).float().numpy()
+                self._vector.fill(0.0)
+                self._vector[indices] = values * np.float32(weight)
+                return Decompressed(self._vector, gradient_norm(values))
+            case np.ndarray() if weight == 1.0:
+                return Decompressed(gradient, gradient_norm(gradient))
+        squares = sum(map(squares_of, self._expand(gradient, weight)))
+        return Decompressed(self._vector, math.sqrt(squares) / weight)
+
+    def _expand(self, gradient: Vector | Bf16Gradient | Int8Gradient, weight: float) -> Iterator[Vector]:
+        """Write the entries times the weight, piece by piece; yield each piece."""
+        pieces = [self._vector[start : start + PIECE] for start in range(0, self._vector.size, PIECE)]
         match gradient:
             case Bf16Gradient(halves):
-                vector.copy_(_numbers(halves))
+                for piece, numbers in zip(pieces, torch.split(_numbers(halves), PIECE), strict=True):
+                    entries = torch.from_numpy(piece).copy_(numbers)
+                    if weight != 1.0:
+                        entries.mul_(weight)
+                    yield piece
             case Int8Gradient(levels, scales):
-                _expand(borrowed(levels), borrowed(scales), vector)
-            case TopKGradient(_, indices, halves):
-                vector.zero_()
-                self._vector[indices] = _numbers(halves).float().numpy()
-        return self._vector
+                steps = torch.split(borrowed(scales) * weight, _BLOCKS)
+                for piece, some, size in zip(pieces, torch.split(borrowed(levels), PIECE), steps, strict=True):
+                    _scale(some, size, torch.from_numpy(piece))
+                    yield piece
+            case _:
+                for start, piece in zip(range(0, gradient.size, PIECE), pieces, strict=True):
+                    yield np.multiply(gradient[start : start + PIECE], np.float32(weight), out=piece)
 
 
 def _numbers(halves: np.ndarray[tuple[int, ...], np.dtype[np.uint16]]) -> torch.Tensor:
@@ -53,11 +76,9 @@ def _numbers(halves: np.ndarray[tuple[int, ...], np.dtype[np.uint16]]) -> torch.
     return borrowed(halves.view(np.int16)).view(torch.bfloat16)
 
 
-def _expand(levels: torch.Tensor, scales: torch.Tensor, vector: torch.Tensor) -> None:
+def _scale(levels: torch.Tensor, scales: torch.Tensor, out: torch.Tensor) -> None:
     """Multiply the levels of each block by its scale; the last block may be a short one."""
     whole = levels.numel() // INT8_BLOCK
     end = whole * INT8_BLOCK
-    rows = (levels[:end].view(whole, INT8_BLOCK), scales[:whole, None], vector[:end].view(whole, INT8_BLOCK))
-    for some_levels, some_scales, values in zip(*(torch.split(row, _ROWS) for row in rows), strict=True):
-        values.copy_(some_levels).mul_(some_scales)
-    torch.mul(levels[end:], scales[whole:], out=vector[end:])
+    out[:end].view(whole, INT8_BLOCK).copy_(levels[:end].view(whole, INT8_BLOCK)).mul_(scales[:whole, None])
+    torch.mul(levels[end:], scales[whole:], out=out[end:])

@@ -21,7 +21,7 @@ def vector(seed: int, size: int = 20_011, norm: float = 1.0) -> Vector:
 
 def received(gradient: Gradient) -> Vector:
     size = gradient.size
-    return Decompressor(size).vector(gradient).copy()
+    return Decompressor(size).decompress(gradient).vector.copy()
 
 
 def left(taken: torch.Tensor) -> Vector:

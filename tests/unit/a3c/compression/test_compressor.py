@@ -23,7 +23,7 @@ def sums(compression: Compression, gradients: list[Vector], largest: float = NO_
     compressor, decompressor = Compressor(compression, SIZE, largest), Decompressor(SIZE)
     sent = np.zeros(SIZE)
     for gradient in gradients:
-        sent += decompressor.vector(compressor.compress(gradient, LATE))
+        sent += decompressor.decompress(compressor.compress(gradient, LATE)).vector
         compressor.accepted()
     return sent.astype(np.float32), np.stack(gradients).sum(axis=0, dtype=np.float64).astype(np.float32)
 
@@ -83,7 +83,7 @@ def test_a_gradient_in_full_is_itself() -> None:
     compressor = Compressor("fp32", SIZE, 1.0)
     assert compressor.compress(gradient, LATE) is gradient
     compressor.accepted()
-    assert Decompressor(SIZE).vector(gradient) is gradient
+    assert Decompressor(SIZE).decompress(gradient).vector is gradient
 
 
 @pytest.mark.parametrize(("compression", "times"), [("bf16", 1.99), ("int8", 3.9), ("topk", 30)])
