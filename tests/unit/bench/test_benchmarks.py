@@ -12,6 +12,8 @@ from hoz_dist.bench.report import Metric
 from hoz_dist.cli.bench_options import CODECS, PRESETS
 from hoz_dist.config import Compression
 from hoz_dist.policy.settings import Preset
+from learner.core import LearnerCore
+from learner.events import Effect, Event, GradientReceived
 
 MOMENT_S = 0.0001
 
@@ -39,8 +41,23 @@ def test_policy() -> None:
 @pytest.mark.parametrize("codec", get_args(Compression))
 def test_learner(codec: Compression) -> None:
     metrics = bench_learner(("compact",), (codec,), seconds=MOMENT_S, repeats=1, progress=silent)
-    check(metrics, {f"learner_compact_{codec}_ms", f"learner_compact_{codec}_ratio"})
+    check(metrics, {f"learner_compact_{codec}_{figure}" for figure in ("ms", "ratio", "lag0_ms")})
     assert metrics[f"learner_compact_{codec}_ratio"].limit == 1.0
+
+
+def test_gradients_for_the_learner_are_one_version_late_and_some_are_not(monkeypatch: pytest.MonkeyPatch) -> None:
+    lags: list[int] = []
+
+    class Noting(LearnerCore):
+        def handle(self, event: Event, now: float) -> list[Effect]:
+            assert isinstance(event, GradientReceived)
+            lags.append(self.version - event.push.version)
+            return super().handle(event, now)
+
+    monkeypatch.setattr("hoz_dist.bench.learner.LearnerCore", Noting)
+    bench_learner(("compact",), ("fp32",), seconds=0.0, repeats=2, progress=silent)
+    # The first one makes a version; then they take turns, each round in the opposite order.
+    assert lags == [0, 0, 1, 1, 0, 0, 1]
 
 
 def test_the_options_offer_every_codec_and_size() -> None:
