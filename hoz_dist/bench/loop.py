@@ -4,7 +4,6 @@ import os
 import zlib
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Final, Protocol
 
 import numpy as np
 import torch
@@ -22,16 +21,6 @@ from workers.collector import Collector
 from workers.preparation import RoomPreparation
 from workers.timings import Timings
 
-_POLL_S: Final = 0.5
-
-
-class Gate(Protocol):
-    """Something that is open or shut."""
-
-    def wait(self, timeout: float) -> bool:
-        """Wait until it is open, but not for longer; tell whether it is."""
-        ...
-
 
 def train_in_process(
     config: RunConfig,
@@ -40,7 +29,6 @@ def train_in_process(
     weights: Path | None,
     name: str,
     timings: Path,
-    gate: Gate,
     *,
     ready: Callable[[], None],
     stopped: Callable[[float], bool],
@@ -54,7 +42,6 @@ def train_in_process(
         weights: Weights of the encoder.
         name: Name of the actor; seeds the episodes.
         timings: File that says after each update what its stages took.
-        gate: Whether to train, or to wait.
         ready: Called before the rooms are got ready.
         stopped: Waits some seconds for the word to stop, and tells whether it came.
     """
@@ -77,8 +64,6 @@ def train_in_process(
     frames = 0
     with Timings(timings, clock) as lines:
         while not stopped(0.0):
-            if not gate.wait(_POLL_S):
-                continue
             with clock("load"):
                 collector.parameters.load(adam.parameters)
             with clock("act"):

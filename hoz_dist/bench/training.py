@@ -1,6 +1,7 @@
 """`hoz-dist bench train`: frames per second of a whole run, where its time goes, and what an update costs.
 
-Runs take turns: while one is measured the processes of the others stand still.
+Runs take turns: while one is measured the actors of the others stand still, and their learners have nothing to do. Who
+stands still for longer than Zenoh's lease loses its session, and makes a new one before it is measured again.
 """
 
 import statistics
@@ -15,6 +16,7 @@ from typing import Final
 from hoz_dist.bench.report import Metric
 from hoz_dist.bench.timing import Contender, Progress, run_contests
 from hoz_dist.bench.timings import TimingsFile, Totals, between
+from hoz_dist.errors import HozError
 
 ACTOR_STAGES: Final = ("act", "differentiate", "push", "answer", "wait", "parameters", "load", "rooms", "report")
 """Stages of an actor, `workers.actor`; ``answer`` is the wait for that of the learner to a push."""
@@ -26,6 +28,8 @@ LEARNER_STAGES: Final = ("receive", "apply", "differentiate", "publish", "serve"
 """Stages of a learner, `learner.serving`; ``receive`` and ``serve`` are of other threads than the rest."""
 SETTLING: Final = 2
 """Updates of each actor before it is measured, after it stood still."""
+LONGEST_S: Final = 300.0
+"""How long an actor may go without an update while it is to train, seconds."""
 _POLL_S: Final = 0.05
 
 
@@ -59,22 +63,32 @@ class Trainers(ABC):
         """Wait until every actor has made so many updates since a time.
 
         Raises:
-            HozError: A process failed.
+            HozError: A process failed, or does not get on.
         """
+        began = time.time()
         while any(file.updates_since(since) < count for file in self.files):
-            self.check()
+            self._check_progress(began)
             time.sleep(_POLL_S)
 
     def await_rooms(self) -> Iterator[int]:
         """Wait until every actor trains in all of its rooms; yields how many do, again and again.
 
         Raises:
-            HozError: A process failed.
+            HozError: A process failed, or does not get on.
         """
+        began = time.time()
         while (ready := sum(file.is_ready for file in self.files)) < len(self.files):
-            self.check()
+            self._check_progress(began)
             yield ready
             time.sleep(_POLL_S)
+
+    def _check_progress(self, began: float) -> None:
+        """Look whether all still work and get on, as they should since a time."""
+        self.check()
+        recent = time.time() - LONGEST_S
+        if began < recent and not all(file.updates_since(recent) for file in self.files):
+            message = f"An actor made no update for {LONGEST_S:g} s; measure fewer actors, or fewer rooms."
+            raise HozError(message)
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ import multiprocessing
 import os
 import signal
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from typing import Any, Final, NamedTuple, TypeVar
@@ -16,9 +16,10 @@ from hoz_dist.wire.transport.environment import child_environment
 START_S: Final = 60.0
 """How long a companion may take to be ready, seconds."""
 STOP_S: Final = 10.0
-"""How long a companion may take to stop before it is terminated, seconds."""
+"""How long a companion may take to stop before it is killed, seconds."""
 T = TypeVar("T")
 _READY: Final = "ready"
+_STOP: Final = "stop"
 
 
 class _Told(NamedTuple):
@@ -69,8 +70,85 @@ def work_apart(title: str, work: Callable[..., T]) -> T:
                     return result
 
 
+class Companion:
+    """A process that serves.
+
+    Args:
+        process: The process.
+        connection: What it says, and is told.
+    """
+
+    def __init__(self, process: BaseProcess, connection: Connection) -> None:
+        self._process = process
+        self._connection = connection
+
+    def check(self) -> None:
+        """Look whether it still serves.
+
+        Raises:
+            HozError: It failed or ended.
+        """
+        if self._connection.poll():
+            self._listen()
+            raise _ended(self._process)
+
+    def await_ready(self) -> None:
+        """Wait until it serves.
+
+        Raises:
+            HozError: It failed, or does not serve in time.
+        """
+        if not self._connection.poll(START_S):
+            message = f"A process of the benchmark did not start within {START_S:g} s."
+            raise HozError(message)
+        if not self._listen():
+            raise _ended(self._process)
+
+    def pause(self) -> None:
+        """Let it stand still; it should see to it itself that it dies with this process."""
+        self._signal(signal.SIGSTOP)
+
+    def resume(self) -> None:
+        """Let it go on after `pause`."""
+        self._signal(signal.SIGCONT)
+
+    def stop(self) -> None:
+        """Tell it to stop, and wait until it has.
+
+        Raises:
+            HozError: It failed, now or before.
+        """
+        self.resume()  # one that stands still hears nothing
+        with suppress(BrokenPipeError):
+            self._connection.send(_STOP)
+        while self._connection.poll(STOP_S):
+            if not self._listen():
+                if self._process.exitcode:
+                    raise _ended(self._process)
+                break
+
+    def _signal(self, number: signal.Signals) -> None:
+        if self._process.is_alive() and self._process.pid is not None:
+            os.kill(self._process.pid, number)
+
+    def _listen(self) -> bool:
+        """Hear what it says; False when it has ended.
+
+        Raises:
+            HozError: It failed.
+        """
+        try:
+            said = self._connection.recv()
+        except (EOFError, ConnectionResetError):  # the latter from one that was killed before it heard all
+            self._process.join()
+            return False
+        if isinstance(said, _Failure):
+            raise HozError(said.sentence)
+        return True
+
+
 @contextmanager
-def companion(serve: Callable[..., None]) -> Iterator[None]:
+def companion(serve: Callable[..., None]) -> Iterator[Companion]:
     """Let a process of its own serve during a ``with`` statement.
 
     Args:
@@ -78,19 +156,13 @@ def companion(serve: Callable[..., None]) -> Iterator[None]:
             stop and tells whether it came; it comes also when this process dies.
 
     Raises:
-        HozError: It failed.
+        HozError: It failed; at the end of the statement, if not before.
     """
     with _started(_serve, serve) as (process, connection):
-        try:
-            answer = connection.recv() if connection.poll(START_S) else _Failure("A helper process did not start.")
-        except EOFError:
-            process.join()
-            raise _ended(process) from None
-        if isinstance(answer, _Failure):
-            raise HozError(answer.sentence)
-        yield
-        connection.close()
-        process.join(STOP_S)
+        served = Companion(process, connection)
+        served.await_ready()
+        yield served
+        served.stop()
 
 
 @contextmanager
@@ -107,7 +179,7 @@ def _started(
     try:
         yield process, ours
     finally:
-        process.terminate()
+        process.kill()  # also one that stands still
         process.join()
         ours.close()
 
@@ -141,7 +213,7 @@ def _serve(connection: Connection, serve: Callable[..., None]) -> None:
     """Serve; the body of a companion."""
     _leave_signals_to_parent()
     try:
-        # A closed connection, too, has something to tell: that it is closed.
+        # The word to stop is never read, so that it stays; a closed connection, too, has something to tell.
         serve(ready=lambda: connection.send(_READY), stopped=connection.poll)
     except HozError as error:
         connection.send(_Failure(str(error)))

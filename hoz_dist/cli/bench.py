@@ -12,13 +12,20 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from hoz_dist.cli.bench_options import Measure, benchmark_options, compress_option, preset_option, show_metrics
+from hoz_dist.cli.bench_options import (
+    Measure,
+    benchmark_options,
+    compress_option,
+    first_rooms,
+    preset_option,
+    rooms_option,
+    show_metrics,
+)
 from hoz_dist.cli.bench_query import query_command
 from hoz_dist.cli.bench_train import train_command
-from hoz_dist.cli.options import cache_option, picture_size_option
-from hoz_dist.nav.categories import SCENES
+from hoz_dist.cli.options import cache_option, picture_size_option, scenes_option
 from hoz_dist.nav.pose import PICTURE_SIZE
-from hoz_dist.nav.rooms import RoomId, training_rooms
+from hoz_dist.nav.rooms import RoomId
 
 if TYPE_CHECKING:
     from hoz_dist.config import Compression
@@ -38,24 +45,15 @@ def bench_group() -> None:
 @click.option(
     "--batch", type=click.IntRange(1, 4096), default=256, show_default=True, help="Episodes that step together."
 )
-@click.option(
-    "--scene",
-    "scenes",
-    multiple=True,
-    default=SCENES,
-    show_default="all scenes",
-    help="Scene or training room to step in, kitchen or kitchen/3; may be repeated.",
-)
-@click.option(
-    "--rooms", type=click.IntRange(1, 20), default=2, show_default=True, help="Training rooms of each scene to step in."
-)
+@scenes_option
+@rooms_option(2)
 @picture_size_option
 @cache_option
 @benchmark_options
 def env_command(
     batch: int,
     scenes: tuple[str, ...],
-    rooms: int,
+    most_rooms: int,
     picture_size: int,
     cache: Path | None,
     seconds: float,
@@ -66,10 +64,10 @@ def env_command(
     """Measure steps per second of stored environments, and how long a room takes to open.
 
     Of one core. A step includes picture features, boxes, appearance and bags, copied out. Limits: a plain copy of as
-    many bytes, and reading a room's files.
+    many bytes, and reading a room's files; the system holds these in memory, as it does for all actors but the first.
     """
     # The rooms are named before the imports that take time: these say what is wrong with the names.
-    names = [room for scene in scenes for room in training_rooms((scene,))[:rooms]]
+    names = first_rooms(scenes, most_rooms)
 
     from hoz_dist.bench.env import bench_env
     from hoz_dist.cli.rendering import Encoding, render_rooms
@@ -128,7 +126,8 @@ def learner_command(
 ) -> None:
     """Measure how long the learner takes from a gradient's bytes to changed parameters.
 
-    Of one core; checksum, decoding and all checks are included. The limit: fused Adam alone on as many parameters.
+    Of one core; checksum, decoding and all checks are included. Gradients are one version old, or none (lag0). The
+    limit: fused Adam alone on as many parameters.
     """
     from hoz_dist.bench.learner import bench_learner
 

@@ -1,13 +1,14 @@
 """Options that the benchmarks share, and how their results are printed."""
 
-from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Callable, Iterable, Mapping
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import click
 from click.core import ParameterSource
 
 from hoz_dist.bench.timing import LEAST_REPEATS
 from hoz_dist.cli.options import echo_json, json_option
+from hoz_dist.nav.rooms import SPLITS, RoomId, training_rooms
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -23,13 +24,6 @@ repeats_option = click.option(
     default=LEAST_REPEATS,
     show_default=True,
     help="Measurements of each figure, of which the median counts; what is compared takes turns.",
-)
-seconds_option = click.option(
-    "--seconds",
-    type=click.FloatRange(0.001, 600.0),
-    default=1.0,
-    show_default=True,
-    help="Length of one measurement, seconds; one that takes longer is made once.",
 )
 preset_option = click.option(
     "--preset",
@@ -49,16 +43,50 @@ compress_option = click.option(
     show_default="all",
     help="How the gradient travels; may be repeated.",
 )
+F = TypeVar("F", bound=Callable[..., Any])
 _LEAST_WIDTH: Final = 118
 """Of a table, columns; names of figures are cut in narrower ones."""
 Measure = Callable[..., "Mapping[str, Metric]"]
 
 
-def benchmark_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Give a command the options of every benchmark: ``--seconds``, ``--repeats`` and ``--json``."""
+def benchmark_options(command: F, *, seconds: float = 1.0) -> F:
+    """Give a command the options of every benchmark: ``--seconds``, ``--repeats`` and ``--json``.
+
+    Args:
+        command: The command.
+        seconds: Default of ``--seconds``.
+    """
+    seconds_option = click.option(
+        "--seconds",
+        type=click.FloatRange(0.001, 600.0),
+        default=seconds,
+        show_default=True,
+        help="Least length of one measurement, seconds.",
+    )
     for option in (json_option, repeats_option, seconds_option):
         command = option(command)
     return command
+
+
+def rooms_option(default: int) -> Callable[[F], F]:
+    """Make the option that says how many rooms of a scene `first_rooms` takes."""
+    return click.option(
+        "--rooms",
+        "most_rooms",
+        type=click.IntRange(1, len(SPLITS["train"])),
+        default=default,
+        show_default=True,
+        help="Training rooms of each scene to use; more take longer to get ready.",
+    )
+
+
+def first_rooms(names: Iterable[str], most: int) -> list[RoomId]:
+    """Return the first training rooms of scenes, and rooms, each once.
+
+    Raises:
+        HozError: A name is not a scene or a training room.
+    """
+    return list(dict.fromkeys(room for name in names for room in training_rooms((name,))[:most]))
 
 
 def show_metrics(metrics: "Mapping[str, Metric]", *, as_json: bool, more: "Mapping[str, str] | None" = None) -> None:

@@ -13,7 +13,7 @@ import click
 from hoz_dist.cli.bench_options import benchmark_options, show_metrics
 from hoz_dist.cli.options import cache_option
 from hoz_dist.cli.ports import free_endpoint
-from hoz_dist.errors import HozError
+from hoz_dist.errors import HozError, InvalidValueError
 from hoz_dist.nav.rooms import RoomId
 
 if TYPE_CHECKING:
@@ -24,6 +24,8 @@ START_S: Final = 300.0
 """How long a training may take to come into full swing, the rendering of its room included, seconds."""
 FULL_SWING: Final = 50
 """Updates after which a training is in full swing."""
+ACTORS: Final = 2
+"""Actors of a training, unless another number is asked for."""
 _ROOM: Final = "kitchen/1"
 """The only room of a training: more would only make it start later."""
 
@@ -35,7 +37,7 @@ _ROOM: Final = "kitchen/1"
     help="Ask a learner that trains; with --connect, one that does.  [default: one that is idle]",
 )
 @click.option(
-    "--actors", type=click.IntRange(1, 64), default=2, show_default=True, help="Actors of the training, processes."
+    "--actors", type=click.IntRange(1, 64), show_default=str(ACTORS), help="Actors of the training, processes."
 )
 @click.option(
     "--connect", metavar="ENDPOINT", help="Ask the learner that runs there.  [default: one started for the benchmark]"
@@ -46,7 +48,7 @@ _ROOM: Final = "kitchen/1"
 @cache_option
 @benchmark_options
 def query_command(
-    actors: int,
+    actors: int | None,
     connect: str | None,
     clients: int,
     cache: Path | None,
@@ -61,11 +63,16 @@ def query_command(
     The limit: as many bytes by Zenoh alone, from a process that does nothing else, asked in turns with the learner. The
     training is of the compact size, with all its processes on this machine.
     """
+    starts_training = training and connect is None
+    if not starts_training and (actors, cache) != (None, None):
+        message = "--actors and --cache are of a training that is started here: add --training, without --connect."
+        raise InvalidValueError(message)
+
     from hoz_dist.bench.bare import answer_bare
     from hoz_dist.bench.query import bench_query, graph_bytes, scene_with_graph
     from hoz_dist.cli.apart import companion, work_apart
 
-    with _learner(connect, actors if training else 0, cache) as endpoint:
+    with _learner(connect, (actors or ACTORS) if starts_training else 0, cache) as endpoint:
         # What a learner tells of its scenes is half a second old; that of ours is known.
         scene = RoomId.parse(_ROOM).scene if connect is None else scene_with_graph(endpoint)
         bare = free_endpoint()

@@ -1,10 +1,9 @@
 """`hoz-dist bench train`: frames per second of whole runs, and which stage they wait for."""
 
-import multiprocessing
 import os
 import signal
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from functools import partial
 from pathlib import Path
@@ -14,15 +13,16 @@ import click
 
 from hoz_dist.bench.timings import TimingsFile, Totals, totals_of
 from hoz_dist.bench.training import Trainers
-from hoz_dist.cli.bench_options import command_line, repeats_option, show_metrics
-from hoz_dist.cli.options import cache_option, force_option, json_option
+from hoz_dist.cli.bench_options import benchmark_options, command_line, first_rooms, rooms_option, show_metrics
+from hoz_dist.cli.child import die_with_parent
+from hoz_dist.cli.options import cache_option, force_option, scenes_option
 from hoz_dist.cli.ports import free_endpoint
 from hoz_dist.cli.processes import Child, Children
 from hoz_dist.cli.run_options import as_arguments, run_config, run_options
 from hoz_dist.errors import HozError, InvalidValueError
-from hoz_dist.nav.categories import SCENES
 
 if TYPE_CHECKING:
+    from hoz_dist.cli.apart import Companion
     from hoz_dist.client import HozClient
     from hoz_dist.config import RunConfig
     from hoz_dist.nav.rooms import RoomId
@@ -41,30 +41,8 @@ if TYPE_CHECKING:
     "processes without Zenoh.",
 )
 @run_options
-@click.option(
-    "--scene",
-    "scenes",
-    multiple=True,
-    default=SCENES,
-    show_default="all scenes",
-    help="Scene or training room to train in, kitchen or kitchen/3; may be repeated.",
-)
-@click.option(
-    "--rooms",
-    "most_rooms",
-    type=click.IntRange(1, 20),
-    default=1,
-    show_default=True,
-    help="Training rooms of each scene; more take longer to come into use.",
-)
-@click.option(
-    "--seconds",
-    type=click.FloatRange(0.1, 600.0),
-    default=4.0,
-    show_default=True,
-    help="Length of one measurement, seconds; of several updates of an actor.",
-)
-@repeats_option
+@scenes_option
+@rooms_option(1)
 @click.option(
     "--costs",
     type=click.Path(dir_okay=False, path_type=Path),
@@ -74,7 +52,7 @@ if TYPE_CHECKING:
 )
 @force_option
 @cache_option
-@json_option
+@partial(benchmark_options, seconds=4.0)
 def train_command(
     actors: tuple[int, ...],
     scenes: tuple[str, ...],
@@ -92,7 +70,7 @@ def train_command(
 
     A learner and its actors as `hoz-dist train` starts them, once all rooms are in use. The limit: as many processes
     that each act, differentiate and optimise without Zenoh. All that is compared takes turns; while one is measured the
-    others stand still.
+    actors of the others stand still.
     """
     if costs is not None and not {1, 2} <= set(actors):
         message = "--costs needs runs with 1 and 2 actors: add --actors 1 --actors 2."
@@ -103,12 +81,11 @@ def train_command(
     from hoz_dist.cli.launch import sharing
     from hoz_dist.cli.progress import Progress
     from hoz_dist.cli.rendering import Encoding, render_rooms
-    from hoz_dist.nav.rooms import training_rooms
     from hoz_dist.sim.view_store import default_cache
 
     if costs is not None:
         check_writable(costs, overwrite=force)
-    rooms = [room for scene in scenes for room in training_rooms((scene,))[:most_rooms]]
+    rooms = first_rooms(scenes, most_rooms)
     config = run_config(choices | {"minutes": None, "frames": None})
     folder = cache or default_cache()
     jobs, counts = len(os.sched_getaffinity(0)), tuple(dict.fromkeys(actors))
@@ -149,9 +126,10 @@ def train_command(
         found = measured_costs(config, measured[_name(1)], measured[_name(2)], jobs, command)
         write_atomically(costs, found.to_text().encode(), overwrite=force)
         for count in counts:
-            real = measured[_name(count)].median(lambda window: window.frames_per_second)
-            predicted = Metric.of([_predicted(found, count, jobs)], "frames/s", real)
-            metrics[f"predicted_frames_per_second_a{count}"] = predicted
+            predicted = _predicted(found, count, jobs)
+            ratios = [predicted / window.frames_per_second for window in measured[_name(count)].windows]
+            metrics[f"predicted_frames_per_second_a{count}"] = Metric.of([predicted], "frames/s")
+            metrics[f"prediction_ratio_a{count}"] = Metric.of(ratios, "x measured", 1.0)
     show_metrics(metrics, as_json=as_json, more={"bottleneck": bottleneck(measured[first])})
 
 
@@ -167,7 +145,11 @@ def _predicted(costs: "Costs", actors: int, cores: int) -> float:
 
 
 class _Run(Trainers):
-    """A learner and its actors, which stand still until they are told to train. Use it in a ``with`` statement.
+    """A learner and its actors, which start when they are first told to train. Use it in a ``with`` statement.
+
+    Actors are not stopped before they have made updates: one that was stopped as it started would not yet die with this
+    process. The learner is never stopped: it has nothing to do while its actors stand still, but for a checkpoint of
+    what they did before.
 
     Args:
         folder: Where the run and its logs are put.
@@ -181,30 +163,20 @@ class _Run(Trainers):
         self._stack = ExitStack()
         self._learner_words = learner
         self._actor_words = actor
-        paths = [folder / f"actor-{number}.jsonl" for number in range(actors)]
-        self._paths = paths
-        self.files = [TimingsFile(path) for path in paths]
+        self._endpoint = free_endpoint()
+        self._paths = [folder / f"actor-{number}.jsonl" for number in range(actors)]
+        self._actors: list[Child] = []
+        self.files = [TimingsFile(path) for path in self._paths]
 
     def __enter__(self) -> Self:
-        from hoz_dist.cli.launch import start_actor, start_learner
+        from hoz_dist.cli.launch import start_learner
 
         with ExitStack() as stack:
             self._folder.mkdir()
             self._children = stack.enter_context(Children(orphaned=signal.SIGKILL))
-            endpoint, run = free_endpoint(), self._folder / "bench"
-            learner = start_learner(self._children, endpoint, run, self._learner_words, self._folder / "learner.log")
-            self._client = stack.enter_context(_client(endpoint, learner))
-            self._actors = [
-                start_actor(
-                    self._children,
-                    endpoint,
-                    path.stem,
-                    [*self._actor_words, "--timings", str(path)],
-                    path.with_suffix(".log"),
-                )
-                for path in self._paths
-            ]
-            self.pause()
+            run, log = self._folder / "bench", self._folder / "learner.log"
+            learner = start_learner(self._children, self._endpoint, run, self._learner_words, log)
+            self._client = stack.enter_context(_client(self._endpoint, learner))
             self._stack = stack.pop_all()
         return self
 
@@ -214,8 +186,14 @@ class _Run(Trainers):
         self._stack.close()
 
     def resume(self) -> None:
+        from hoz_dist.cli.launch import start_actor
+
         for actor in self._actors:
             actor.resume()
+        for path in self._paths[len(self._actors) :]:
+            words = [*self._actor_words, "--timings", str(path)]
+            log = path.with_suffix(".log")
+            self._actors.append(start_actor(self._children, self._endpoint, path.stem, words, log))
 
     def pause(self) -> None:
         for actor in self._actors:
@@ -228,25 +206,27 @@ class _Run(Trainers):
                 raise HozError(message)
 
     def learner(self) -> Totals:
-        status = self._client.status()
-        return totals_of(status["timings"]) | {"busy": float(status["busy"]), "version": float(status["version"])}
+        return totals_of(self._client.status()["timings"])
 
 
 class _Loops(Trainers):
     """Processes that train without Zenoh."""
 
-    def __init__(self, paths: Sequence[Path], gate: Any) -> None:
+    def __init__(self, paths: Sequence[Path], loops: "Sequence[Companion]") -> None:
         self.files = [TimingsFile(path) for path in paths]
-        self._gate = gate
+        self._loops = loops
 
     def resume(self) -> None:
-        self._gate.set()
+        for loop in self._loops:
+            loop.resume()
 
     def pause(self) -> None:
-        self._gate.clear()
+        for loop in self._loops:
+            loop.pause()
 
     def check(self) -> None:
-        """Nothing to look at: a process that failed says so when it is told to stop."""
+        for loop in self._loops:
+            loop.check()
 
 
 @contextmanager
@@ -257,13 +237,19 @@ def _in_process(
     from hoz_dist.bench.loop import train_in_process
     from hoz_dist.cli.apart import companion
 
-    gate = multiprocessing.get_context("spawn").Event()
     paths = [folder / f"alone-{number}.jsonl" for number in range(count)]
     with ExitStack() as stack:
-        for path in paths:
-            work = partial(train_in_process, config, rooms, cache, weights, path.stem, path, gate)
-            stack.enter_context(companion(work))
-        yield _Loops(paths, gate)
+        work = partial(train_in_process, config, rooms, cache, weights)
+        works = (partial(work, path.stem, path) for path in paths)
+        loops = _Loops(paths, [stack.enter_context(companion(partial(_mortal, os.getpid(), work))) for work in works])
+        loops.pause()
+        yield loops
+
+
+def _mortal(parent: int, work: Callable[..., None], **told: Any) -> None:
+    """Do the work of a process that may stand still, and then hears nothing but SIGKILL."""
+    die_with_parent(parent, signal.SIGKILL)
+    work(**told)
 
 
 @contextmanager

@@ -9,8 +9,6 @@ import signal
 import sys
 from typing import Final
 
-from hoz_dist.cli.main import main
-
 _PR_SET_PDEATHSIG: Final = 1
 """Linux's prctl option: the signal that a process gets when its parent dies."""
 
@@ -30,4 +28,7 @@ def die_with_parent(parent: int, number: int = signal.SIGTERM) -> None:
 
 if __name__ == "__main__":
     die_with_parent(*map(int, sys.argv.pop(1).split(":")))
+
+    from hoz_dist.cli.main import main  # only now: the parent may die before this is done
+
     main()

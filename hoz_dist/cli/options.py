@@ -6,7 +6,17 @@ from typing import Any
 
 import click
 
+from hoz_dist.nav.categories import SCENES
 from hoz_dist.nav.pose import PICTURE_SIZE
+
+scenes_option = click.option(
+    "--scene",
+    "scenes",
+    multiple=True,
+    default=SCENES,
+    show_default="all scenes",
+    help=f"Scene ({', '.join(SCENES)}) or training room (kitchen/3) to train in; may be repeated.",
+)
 
 cache_option = click.option(
     "--cache",

@@ -5,10 +5,9 @@ from typing import Any
 
 import click
 
-from hoz_dist.cli.options import cache_option, keep_every_option
+from hoz_dist.cli.options import cache_option, keep_every_option, scenes_option
 from hoz_dist.cli.ports import free_endpoint
 from hoz_dist.cli.run_options import as_arguments, run_config, run_options
-from hoz_dist.nav.categories import SCENES
 
 
 @click.command("train")
@@ -27,12 +26,7 @@ from hoz_dist.nav.categories import SCENES
 @click.option("--frames", type=click.IntRange(1), help="Train for this many frames instead of a time.")
 @click.option("--actors", type=click.IntRange(1, 256), default=2, show_default=True, help="Number of actor processes.")
 @run_options
-@click.option(
-    "--scene",
-    "scenes",
-    multiple=True,
-    help=f"Scene or room to train in: {', '.join(SCENES)}, kitchen/3; may be repeated.  [default: all scenes]",
-)
+@scenes_option
 @click.option(
     "--episodes",
     type=click.IntRange(0, 100_000),
@@ -69,12 +63,12 @@ def train_command(
     from hoz_dist.nav.rooms import training_rooms
 
     # What is wrong with the options is said before anything starts.
-    training_rooms(scenes or SCENES)
+    training_rooms(scenes)
     choices |= {"minutes": 10.0 if minutes is None and frames is None else minutes, "frames": frames}
     config = run_config(choices)
     files = {"weights": choices["weights"], "cache": cache}
     shared = sharing(config.preset, wanted=shared_memory)
-    actor = as_arguments({"scene": scenes or SCENES, **files}) + shared
+    actor = as_arguments({"scene": scenes, **files}) + shared
     learner = as_arguments(choices | {"keep_every": keep_every, "cache": cache}) + shared
 
     launch(run, free_endpoint(), learner, actor, actors)

@@ -104,6 +104,9 @@ def test_query_asks_alone_and_with_others() -> None:
         (["policy", "--preset", "huge"], "Invalid value for '--preset'"),
         (["learner", "--compress", "zip"], "Invalid value for '--compress'"),
         (["query", "--connect", "nowhere"], "'nowhere' is not an endpoint"),
+        (["query", "--connect", "tcp/127.0.0.1:1", "--training", "--actors", "2"], "--actors and --cache are of a"),
+        (["query", "--cache", "views"], "--actors and --cache are of a training that is started here"),
+        (["train", "--costs", "costs.json"], "--costs needs runs with 1 and 2 actors"),
     ],
 )
 def test_bad_input_is_one_sentence(words: list[str], said: str, capsys: pytest.CaptureFixture[str]) -> None:

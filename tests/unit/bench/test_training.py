@@ -1,6 +1,7 @@
 """What the benchmark of training makes of what actors and a learner write."""
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +23,7 @@ def line(time: float, updates: int, waiting: int = 0, **stages: float) -> str:
 class Still(Trainers):
     """Processes that did all beforehand."""
 
-    files = ()
+    files: Sequence[TimingsFile] = ()
 
     def resume(self) -> None:
         pass
@@ -96,6 +97,16 @@ def test_what_goes_on_while_the_actor_acts_is_none_of_its_time() -> None:
         window.actors["wait.count"] = 5.0
     assert metrics_of(run, None)["actor_other_ms"].median == pytest.approx(200.0)
     assert bottleneck(run) == "actor act"
+
+
+def test_actors_that_do_not_get_on_are_not_waited_for_for_ever(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("hoz_dist.bench.training.LONGEST_S", 0.0)
+    stuck = Still()
+    stuck.files = (TimingsFile(tmp_path / "timings"),)
+    with pytest.raises(HozError, match="made no update for 0 s"):
+        stuck.await_updates(1, 0.0)
+    with pytest.raises(HozError, match="made no update for 0 s"):
+        list(stuck.await_rooms())
 
 
 def test_the_bottleneck_is_the_longest_stage_and_the_learners_when_actors_wait() -> None:

@@ -34,6 +34,18 @@ def serve(begun: Path, ended: Path, ready: Callable[[], None], stopped: Callable
     ended.touch()
 
 
+def serve_and_fail(ready: Callable[[], None], stopped: Callable[[float], bool]) -> None:
+    ready()
+    stopped(60.0)
+    raise NotFoundError("There is nothing here.")  # noqa: EM101, TRY003 - a sentence that the test looks for
+
+
+def serve_and_die(ready: Callable[[], None], stopped: Callable[[float], bool]) -> None:
+    del stopped
+    ready()
+    os._exit(7)
+
+
 def test_work_gets_the_environment_of_actors_and_gives_its_result(capsys: pytest.CaptureFixture[str]) -> None:
     assert work_apart("Adding", partial(add_up, [1, 2, 3])) == (6, "PASSIVE")
     assert "OMP_WAIT_POLICY" not in os.environ
@@ -52,3 +64,34 @@ def test_a_companion_serves_until_it_is_told_to_stop(tmp_path: Path) -> None:
         assert begun.exists()
         assert not ended.exists()
     assert ended.exists()
+
+
+def test_a_companion_that_fails_says_so_at_the_end() -> None:
+    with pytest.raises(HozError, match=r"There is nothing here\."), companion(serve_and_fail) as served:
+        served.check()
+
+
+def look_until_it_ends(serve: Callable[..., None]) -> None:
+    with companion(serve) as served:
+        while True:
+            served.check()
+
+
+def interrupt_while_it_stands_still(serve: Callable[..., None]) -> None:
+    with companion(serve) as served:
+        served.pause()
+        raise KeyboardInterrupt
+
+
+def test_a_companion_that_has_ended_is_found_out_when_looked_at() -> None:
+    with pytest.raises(HozError, match="exit status 7"):
+        look_until_it_ends(serve_and_die)
+
+
+def test_a_companion_that_stands_still_is_ended_all_the_same(tmp_path: Path) -> None:
+    begun, ended = tmp_path / "begun", tmp_path / "ended"
+    with companion(partial(serve, begun, ended)) as served:
+        served.pause()
+    assert ended.exists()
+    with pytest.raises(KeyboardInterrupt):
+        interrupt_while_it_stands_still(partial(serve, begun, ended))
