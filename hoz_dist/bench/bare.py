@@ -13,16 +13,18 @@ TICK_S: Final = 0.1
 
 
 class BareReplies(Closing):
-    """Answers every question on `BARE_KEY` with the same bytes.
+    """Answers every question on a key.
 
     Args:
         session: Session to answer on.
-        payload: The answer.
+        answer: Makes the answer.
+        key: The key.
     """
 
-    def __init__(self, session: Session, payload: bytes) -> None:
-        self._queryable = session.declare_queryable(BARE_KEY)
-        self._payload = payload
+    def __init__(self, session: Session, answer: Callable[[], bytes], key: str = BARE_KEY) -> None:
+        self._queryable = session.declare_queryable(key)
+        self._answer = answer
+        self._key = key
         self._thread = threading.Thread(target=self._run, name="bare replies", daemon=True)
         self._thread.start()
 
@@ -36,13 +38,13 @@ class BareReplies(Closing):
             with query:
                 if query.payload is not None:
                     query.payload.to_bytes()
-                query.reply(BARE_KEY, self._payload)
+                query.reply(self._key, self._answer())
 
 
-def ask_bare(session: Session, payload: bytes | None = None) -> int:
-    """Ask once, and return the number of bytes of the answers."""
-    replies = session.get(BARE_KEY, payload=payload)
-    return sum(len(reply.ok.payload.to_bytes()) for reply in replies if reply.ok is not None)
+def ask_bare(session: Session, payload: bytes | None = None, key: str = BARE_KEY) -> bytes:
+    """Ask once, and return the answer; nothing if there is none."""
+    replies = session.get(key, payload=payload)
+    return b"".join(reply.ok.payload.to_bytes() for reply in replies if reply.ok is not None)
 
 
 def answer_bare(endpoint: str, payload: bytes, *, ready: Callable[[], None], stopped: Callable[[float], bool]) -> None:
@@ -54,7 +56,7 @@ def answer_bare(endpoint: str, payload: bytes, *, ready: Callable[[], None], sto
         ready: Called when it listens.
         stopped: Tells whether to stop; waits for that so many seconds.
     """
-    with open_router(endpoint) as session, BareReplies(session, payload):
+    with open_router(endpoint) as session, BareReplies(session, lambda: payload):
         ready()
         while not stopped(TICK_S):
             pass

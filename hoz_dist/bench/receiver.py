@@ -1,12 +1,16 @@
 """The other side of `hoz-dist bench wire`: the wire of a learner that accepts everything and learns nothing."""
 
 from collections.abc import Callable, Mapping
+from functools import partial
+from itertools import count
 from typing import Any, Final
 
 import numpy as np
 
 from hoz_dist.bench.bare import TICK_S, BareReplies
+from hoz_dist.bench.samples import gradient
 from hoz_dist.config import RunConfig
+from hoz_dist.gradient_forms import Vector
 from hoz_dist.nav.categories import TARGETS
 from hoz_dist.wire.protocol.answers import Accepted
 from hoz_dist.wire.protocol.codec import encode
@@ -20,6 +24,8 @@ from hoz_dist.wire.transport.shared_memory import SharedMemory
 
 KEYS: Final = Keys("bench")
 EPOCH: Final = 1
+PUBLISH_KEY: Final = "hoz-bench/publish"
+"""Who asks here has the next version published before the answer comes, which is its number."""
 
 
 def receive(
@@ -30,7 +36,7 @@ def receive(
     ready: Callable[[], None],
     stopped: Callable[[float], bool],
 ) -> None:
-    """Accept pushes and serve parameters until told to stop; the first push changes the parameters.
+    """Accept pushes and serve parameters until told to stop.
 
     Args:
         endpoint: Where to listen.
@@ -41,15 +47,20 @@ def receive(
     """
     config = RunConfig()
     accepted = Accepted(EPOCH, 0)
+    versions, first = count(), published(parameters, 0)
+
+    def publish() -> bytes:
+        version = next(versions)
+        publisher.publish(EPOCH, version, _later(first, version))
+        return str(version).encode()
+
     with (
         SharedMemory(on=shared_memory) as memory,
         open_router(endpoint, shared_memory=memory.on) as session,
         ParametersPublisher(session, KEYS, memory=memory) as publisher,
-        BareReplies(session, encode(accepted)),
+        BareReplies(session, partial(encode, accepted)),
+        BareReplies(session, publish, PUBLISH_KEY),
     ):
-        vector = np.random.default_rng(0).standard_normal(parameters, dtype=np.float32)
-        publisher.publish(EPOCH, 0, vector)
-        version = 0
         snapshots = Snapshots(_config_reply(config.to_json()), _no_status, config.edge_cost)
         with Server(session, KEYS, snapshots, parameters=parameters) as server:
             ready()
@@ -57,10 +68,15 @@ def receive(
                 request = server.inbox.take(TICK_S)
                 if request is not None:
                     request.answer(accepted)
-                    if version == 0:
-                        # Who has fetched the first version before it pushed gets later ones as a difference to it.
-                        version = 1
-                        publisher.publish(EPOCH, version, vector * np.float32(1.001))
+
+
+def published(parameters: int, version: int) -> Vector:
+    """Return the parameters [P] of a version."""
+    return _later(gradient(parameters), version)
+
+
+def _later(first: Vector, version: int) -> Vector:
+    return first * np.float32(1.0 + version / 1000.0)
 
 
 def _config_reply(config: Mapping[str, Any]) -> ConfigReply:

@@ -7,12 +7,14 @@ from functools import partial
 from itertools import count
 from typing import Final
 
+import numpy as np
+
 from hoz_dist.a3c.compression.compressor import Compressor
 from hoz_dist.bench.bare import ask_bare
-from hoz_dist.bench.receiver import EPOCH, KEYS
+from hoz_dist.bench.receiver import EPOCH, KEYS, PUBLISH_KEY, published
 from hoz_dist.bench.report import Metric
 from hoz_dist.bench.samples import LATE, gradient
-from hoz_dist.bench.timing import Contender, Progress, rate, run_contests
+from hoz_dist.bench.timing import Contender, Progress, rate, run_contests, seconds_per_call
 from hoz_dist.config import Compression, RunConfig
 from hoz_dist.nav.episode import EpisodeResult
 from hoz_dist.nav.rooms import RoomId
@@ -20,6 +22,7 @@ from hoz_dist.wire.client.parameters import ParametersFollower
 from hoz_dist.wire.client.push import Pusher
 from hoz_dist.wire.protocol.answers import Accepted
 from hoz_dist.wire.protocol.codec import encode
+from hoz_dist.wire.protocol.parameters import Parameters
 from hoz_dist.wire.protocol.pushes import EpisodesPush, GradientPush
 from hoz_dist.wire.transport.session import Session, open_client
 from hoz_dist.wire.transport.shared_memory import SharedMemory
@@ -43,7 +46,8 @@ def bench_wire(
 ) -> dict[str, Metric]:
     """Measure pushes to receivers of other processes until they are acknowledged, and fetches of parameters.
 
-    A push includes checks, encoding and checksum, a fetch decoding and digest. The limit is one copy of the bytes; of
+    A push includes checks, encoding and checksum, a fetch decoding and digest. Each fetch is of another version, and a
+    delta is computed for it, as for an actor that is alone. The limit is one copy of the bytes; of
     the small push, a question of Zenoh's with as many bytes there and back.
 
     Args:
@@ -91,9 +95,9 @@ def _large(endpoint: str, shared_endpoint: str, parameters: int, seconds: float)
             push = _pushing(session, memory, parameters)
             contenders["push" + suffix] = partial(_milliseconds, push, seconds)
             for kind, deltas in (("fetch", False), ("delta", True)):
-                follower = ParametersFollower(session, KEYS, threading.Event(), deltas=deltas)
-                fetch = partial(_fetch, stack.enter_context(follower))
-                contenders[kind + suffix] = partial(_milliseconds, fetch, seconds)
+                follower = stack.enter_context(ParametersFollower(session, KEYS, threading.Event(), deltas=deltas))
+                contenders[kind + suffix] = partial(_fetching, session, follower, seconds)
+                _check_kind(session, follower, deltas=deltas)
         yield contenders
 
 
@@ -129,8 +133,27 @@ def _pushing(session: Session, memory: SharedMemory, parameters: int) -> Callabl
     return work
 
 
-def _fetch(follower: ParametersFollower) -> None:
-    follower.fetch(timeout_s=DEADLINE_S)
+def _publish(session: Session) -> int:
+    return int(ask_bare(session, key=PUBLISH_KEY))
+
+
+def _fetch(follower: ParametersFollower, version: int) -> Parameters:
+    parameters = follower.fetch(timeout_s=DEADLINE_S)
+    assert parameters.head.version == version  # noqa: S101 - none that was fetched before
+    return parameters
+
+
+def _fetching(session: Session, follower: ParametersFollower, seconds: float) -> float:
+    return 1000 * seconds_per_call(partial(_publish, session), partial(_fetch, follower), seconds)
+
+
+def _check_kind(session: Session, follower: ParametersFollower, *, deltas: bool) -> None:
+    """See that versions come in full, or as deltas, which round them."""
+    _fetch(follower, _publish(session))  # also the first delta is one to a version that came in full
+    fetched = _fetch(follower, _publish(session))
+    exact = published(fetched.head.size, fetched.head.version)
+    assert np.allclose(fetched.vector, exact, atol=1e-4 * float(exact.max()))  # noqa: S101 - what is measured
+    assert np.array_equal(fetched.vector, exact) is not deltas  # noqa: S101 - what is measured
 
 
 def _check(answer: object) -> None:
