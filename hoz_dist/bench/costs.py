@@ -1,20 +1,18 @@
 """From what runs of one and two actors took to the costs that `hoz-dist simulate` computes with."""
 
-import math
-
 from hoz_dist.bench.report import this_machine
 from hoz_dist.bench.training import Measured, Window
 from hoz_dist.config import RunConfig
 from hoz_dist.policy.parameters import initial_parameters
 from hoz_dist.scaling.calibration import fitted
 from hoz_dist.scaling.costs import Costs
-from hoz_dist.wire.client.parameters import MOST_UNDER_WAY
 
 
 def measured_costs(config: RunConfig, one: Measured, two: Measured, cores: int, command: str) -> Costs:
     """Return the costs of an update on this machine.
 
-    What the stages of a process do not account for is counted as Zenoh's threads'.
+    What the stages of a process do not account for is counted as Zenoh's threads'. Of a run that learns from rollouts
+    these are the costs of that: the learner's computing of gradients counts as applying.
 
     Args:
         config: Configuration of the runs.
@@ -42,7 +40,7 @@ def measured_costs(config: RunConfig, one: Measured, two: Measured, cores: int, 
         frames=one.median(lambda window: window.actor("frames")),
         act=actor("act"),
         differentiate=actor("differentiate"),
-        load=actor("load", "report"),
+        load=actor("load", "report", "rooms", "wait"),
         push=actor("push", "answer"),
         fetch=actor("parameters"),
         actor_wire=one.median(lambda window: _rest(window.actors) / window.updates),
@@ -50,9 +48,8 @@ def measured_costs(config: RunConfig, one: Measured, two: Measured, cores: int, 
         apply=learner("apply", "differentiate"),
         publish=learner("publish"),
         serve=learner("serve"),
-        record=learner("record"),
+        record=learner("record", "idle"),
         learner_wire=one.median(lambda window: _rest(window.learner) / window.updates),
-        round_trips=math.ceil(one.median(lambda window: window.of_learner("serve.count")) / MOST_UNDER_WAY),
     )
     return fitted(costs, cores, one.median(_speed), two.median(_speed))
 

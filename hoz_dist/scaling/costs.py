@@ -3,19 +3,24 @@
 import json
 from collections.abc import Iterable
 from dataclasses import MISSING, asdict, dataclass, fields, replace
+from functools import cached_property
 from importlib.resources import files
 from typing import Final
 
 from hoz_dist.errors import DamagedFileError, InvalidValueError, UnknownNameError
+from hoz_dist.scaling.sizes import (
+    COMPRESSIONS,
+    PARAMETERS_FORMS,
+    gradient_bytes,
+    parameters_bytes,
+    questions,
+    rollout_bytes,
+)
 
 SHIPPED: Final = ("compact", "paper")
 """Presets whose costs come with the package."""
-BYTES_OF_ENTRY: Final = {"fp32": 4.0, "bf16": 2.0, "int8": 1.0, "topk": 0.08}
-"""Bytes of a parameter's gradient on the wire; ``topk`` sends 1% of them, each with its place."""
-BYTES_OF_PARAMETER: Final = {"full": 4.0, "delta": 1.0}
-"""Bytes of a parameter on the wire."""
-BYTES_OF_FRAME: Final = 64.0
-"""Bytes of a frame of a rollout on the wire."""
+SOURCES: Final = ("gradients", "rollouts")
+"""What a run can learn from."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,7 +47,7 @@ class Costs:
     act: float
     """Observe, decide and step through a rollout."""
     differentiate: float
-    """Compute the gradient."""
+    """Compute the gradient; 0 with rollouts."""
     load: float
     """Put fetched parameters into the policy, and everything else."""
     push: float
@@ -55,7 +60,7 @@ class Costs:
     receive: float
     """Check and decode what is pushed."""
     apply: float
-    """Judge a gradient and change the parameters."""
+    """Judge a gradient and change the parameters; of a rollout, compute its gradient too."""
     publish: float
     """Copy the parameters for readers and make them known."""
     serve: float
@@ -68,17 +73,24 @@ class Costs:
     """Tell one actor that there are new parameters, in the learner's own thread."""
     notify_wire: float = 1e-5
     """The same in Zenoh's threads."""
-    fixed: float = 2e-4
-    """The part of ``receive``, ``apply``, ``publish`` and ``serve`` that fewer parameters would cost as well, each."""
+    fixed: float = 4e-4
+    """The part of ``receive``, ``apply``, ``publish`` and ``serve`` that fewer parameters would cost as well, each; in
+    the interpreter, whose lock it holds."""
     gil: float = 0.2
-    """Share of the time of the learner's Python threads in which they hold the interpreter lock."""
-    # --- the wire ---
-    round_trips: int = 1
-    """Questions and answers that follow each other when parameters are fetched."""
+    """Share of the rest of the time of the learner's Python threads in which they hold the interpreter lock: not
+    measured; NumPy and PyTorch give it up for most of what they do."""
+    # --- fitted to two runs on one host; see `hoz_dist.scaling.calibration` ---
     exchange: float = 0.0
-    """Time that a question and its answer take beside all that computes, seconds; fitted to a run of one actor."""
+    """Time that a question and its answer take beside all that computes, seconds."""
     crowding: float = 0.0
-    """Share by which all takes longer while all cores of a host work; fitted to a run of two actors."""
+    """Share by which all takes longer while all cores of a host work."""
+    measured_one: float = 0.0
+    """Frames per second of the run with one actor; 0 if nothing was fitted, as the next three."""
+    measured_two: float = 0.0
+    """With two."""
+    modelled_one: float = 0.0
+    """What the model makes of it."""
+    modelled_two: float = 0.0
 
     def __post_init__(self) -> None:
         """Check every field."""
@@ -90,37 +102,66 @@ class Costs:
             if not low <= value < _MOST:
                 message = f"'{field.name}' of the costs is {value:g}; it must be at least {low} and finite."
                 raise InvalidValueError(message)
-        _check("source to learn from", self.learn_from, ("gradients", "rollouts"))
-        _check("compression", self.compress, BYTES_OF_ENTRY)
-        _check("form of parameters", self.parameters_form, BYTES_OF_PARAMETER)
+        if self.gil > 1.0:
+            message = f"'gil' of the costs is {self.gil:g}; it is a share, and at most 1."
+            raise InvalidValueError(message)
+        _check("source to learn from", self.learn_from, SOURCES)
+        _check("compression", self.compress, COMPRESSIONS)
+        _check("form of parameters", self.parameters_form, PARAMETERS_FORMS)
 
-    @property
+    @cached_property
     def bytes_up(self) -> float:
         """Bytes of a push."""
         if self.learn_from == "rollouts":
-            return BYTES_OF_FRAME * self.frames
-        return BYTES_OF_ENTRY[self.compress] * self.parameters
+            return rollout_bytes(self.frames)
+        return gradient_bytes(self.compress, self.parameters)
 
-    @property
+    @cached_property
     def bytes_down(self) -> float:
         """Bytes of all parameters."""
-        return BYTES_OF_PARAMETER[self.parameters_form] * self.parameters
+        return parameters_bytes(self.parameters_form, self.parameters)
+
+    @cached_property
+    def questions(self) -> int:
+        """Questions in which all parameters are fetched."""
+        return questions(self.parameters_form, self.parameters)
+
+    @cached_property
+    def up_share(self) -> float:
+        """Share of an update's bytes, and so of Zenoh's time, that goes to the push; the rest goes to parameters."""
+        return self.bytes_up / (self.bytes_up + self.bytes_down)
+
+    def held(self, seconds: float) -> float:
+        """Return for how long a stage of a learner's Python thread holds the interpreter lock."""
+        fixed = min(self.fixed, seconds)
+        return fixed + self.gil * (seconds - fixed)
 
     def adapted(
         self, *, learn_from: str | None = None, compress: str | None = None, parameters_form: str | None = None
     ) -> "Costs":
         """Return the costs with something else on the wire; None leaves a choice as it was measured.
 
-        Zenoh's time goes with the bytes. Coding is taken to cost what it did. A learner that learns from rollouts
-        computes the gradients itself, and receives in proportion to the bytes.
+        Zenoh's time goes with the bytes. Coding is taken to cost what it did. What a learner does with a rollout is
+        estimated if it was not measured: it goes through the steps once more and differentiates, which is taken to cost
+        what acting and differentiating cost the actor, and receives in proportion to the bytes.
 
         Raises:
-            InvalidValueError: The costs are of rollouts, from which those of gradients cannot be told.
+            InvalidValueError: The costs are of rollouts, from which those of gradients cannot be told; or there would
+                be a compression of rollouts.
             UnknownNameError: There is no such choice.
         """
+        learn_from = learn_from or self.learn_from
+        if learn_from == "rollouts":
+            if compress not in {None, "fp32"}:
+                message = "Only gradients are compressed: leave out the compression, or learn from gradients."
+                raise InvalidValueError(message)
+            compress = "fp32"
+        elif self.learn_from == "rollouts":
+            message = "These costs are of rollouts; those of gradients need a measurement of their own."
+            raise InvalidValueError(message)
         new = replace(
             self,
-            learn_from=learn_from or self.learn_from,
+            learn_from=learn_from,
             compress=compress or self.compress,
             parameters_form=parameters_form or self.parameters_form,
         )
@@ -128,14 +169,11 @@ class Costs:
         new = replace(new, actor_wire=share * self.actor_wire, learner_wire=share * self.learner_wire)
         if new.learn_from == self.learn_from:
             return new
-        if self.learn_from == "rollouts":
-            message = "These costs are of rollouts; those of gradients need a measurement of their own."
-            raise InvalidValueError(message)
         up = new.bytes_up / self.bytes_up
         return replace(
             new,
             differentiate=0.0,
-            apply=self.apply + self.differentiate,
+            apply=self.apply + self.act + self.differentiate,
             receive=self.fixed + up * self.receive,
             push=up * self.push,
         )
@@ -155,7 +193,6 @@ class Costs:
             publish=share(self.publish),
             serve=share(self.serve),
             learner_wire=self.learner_wire / shards,
-            round_trips=-(-self.round_trips // shards),
         )
 
     def to_text(self) -> str:
@@ -196,18 +233,36 @@ class Costs:
             raise DamagedFileError(message) from error
 
 
-def shipped_costs(preset: str) -> Costs:
-    """Return the costs that come with the package.
+def shipped_costs(preset: str) -> list[Costs]:
+    """Return the costs that come with the package: of gradients, and of rollouts if they were measured.
 
     Raises:
         UnknownNameError: There are none of that preset.
     """
     _check("preset", preset, SHIPPED)
-    file = files("hoz_dist.scaling") / "measured" / f"{preset}.json"
-    return Costs.from_text(file.read_text(encoding="utf-8"), str(file))
+    folder = files("hoz_dist.scaling") / "measured"
+    there = [file for name in (preset, f"{preset}-rollouts") if (file := folder / f"{name}.json").is_file()]
+    return [Costs.from_text(file.read_text(encoding="utf-8"), str(file)) for file in there]
 
 
-_POSITIVE: Final = frozenset({"parameters", "frames", "round_trips"})
+def costs_of(measured: Iterable[Costs], learn_from: str | None = None) -> Costs:
+    """Return the costs of what is learnt from: those that were measured, or else what can be told from the others.
+
+    Args:
+        measured: At least one.
+        learn_from: ``gradients`` or ``rollouts``; None for what the first ones were measured with.
+
+    Raises:
+        InvalidValueError: See `Costs.adapted`.
+        UnknownNameError: There is no such source.
+    """
+    first, *others = measured
+    wanted = learn_from or first.learn_from
+    found = next((one for one in (first, *others) if one.learn_from == wanted), None)
+    return found if found is not None else first.adapted(learn_from=wanted)
+
+
+_POSITIVE: Final = frozenset({"parameters", "frames"})
 _MOST: Final = 1e12
 
 

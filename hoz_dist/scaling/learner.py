@@ -16,31 +16,24 @@ class Learner(Node):
         place: Where it runs.
         costs: What its stages take.
         clients: How many processes are told of new parameters.
-        counted: Where to count.
-        max_lag: Largest policy lag at which a gradient is applied, versions.
+        counted: Where to count what becomes of the actors' updates.
+        most_lag: Largest policy lag of a push that is applied, versions.
     """
 
-    def __init__(self, place: Place, costs: Costs, *, clients: int, counted: Counted, max_lag: int) -> None:
+    def __init__(self, place: Place, costs: Costs, *, clients: int, counted: Counted, most_lag: int) -> None:
         super().__init__(place, costs, clients=clients, counted=counted)
-        self._max_lag = max_lag
-
-    def begin(self, reader: object) -> int | None:
-        """Begin to read the newest version; None when no more can be kept."""
-        version = super().begin(reader)
-        self.counted.fetched += version is not None
-        return version
+        self._most_lag = most_lag
 
     def handle(self, push: Push) -> Generator[simpy.Event, Any, Answer]:
         """Refuse a push that is stale; apply the others, and publish the parameters."""
         counted, lag = self.counted, self.version - push.version
-        if lag > self._max_lag:
+        if lag > self._most_lag:
             yield from self._compute(self.costs.fixed)
             counted.stale += push.count
             return Answer("stale", self.version)
         yield from self._compute(self.costs.apply)
         yield from self._publish()
         self.version += 1
-        counted.updates += 1
         counted.frames += push.frames
         counted.applied += push.count
         counted.lags += push.count * lag

@@ -8,14 +8,16 @@ from typing import Final
 
 import simpy
 
+from hoz_dist.config import RunConfig
 from hoz_dist.errors import InvalidValueError
 from hoz_dist.scaling.client import Client
 from hoz_dist.scaling.costs import Costs
 from hoz_dist.scaling.learner import Learner
-from hoz_dist.scaling.node import Counted, Link, Node, Place, Process, Push
+from hoz_dist.scaling.links import Link, Way
+from hoz_dist.scaling.node import Counted, Node, Place, Push
 from hoz_dist.scaling.relay import Relay
 from hoz_dist.scaling.setting import Prediction, Setting
-from hoz_dist.scaling.sharing import Shared
+from hoz_dist.scaling.sharing import Process, Shared
 
 LEAST_UPDATES: Final = 200
 """Actors' updates over which is measured, at least."""
@@ -23,8 +25,8 @@ UPDATES_PER_ACTOR: Final = 3
 """The same, for each actor."""
 WARM_UP: Final = 0.5
 """Updates before, as a share of those that are measured; the first of an actor is not like the others."""
-LONGEST_S: Final = 3600.0
-"""Simulated time after which nothing is waited for any more: the run does not get on."""
+STANDSTILL_S: Final = 3600.0
+"""Simulated time without an update that is answered for good after which a run does not get on."""
 _PROGRESS_EVERY: Final = 500
 _TINY: Final = 1e-9
 
@@ -50,10 +52,12 @@ class _Moment:
 
     now: float
     counted: Counted
-    sent: int
-    """Pushes that were sent to the learner."""
+    learner: dict[str, float]
+    """Of the learner's own counters: ``version``, ``settled``, ``busy``, ``resent``, and bits ``up`` and ``down``."""
     actors: float
     """Seconds of the actors' cores."""
+    waited: float
+    """Seconds in which the learner's threads waited for the interpreter lock."""
     used: dict[str, float]
     """Seconds in which each of the learner's resources was fully used."""
     relays: list[dict[str, float]]
@@ -75,9 +79,8 @@ class _Run:
         self._env = env = simpy.Environment()
         self._counted = Counted()
         self._goal, self._until = env.event(), 0
-        self._host = Shared(env, setting.cores, costs.crowding)
-        # All cores of the actors' hosts work, as those of this host do with two actors.
-        self._actors = self._host if setting.one_host else Shared(env, math.inf, costs.crowding)
+        self._host = Shared(env, setting.cores, crowding=costs.crowding)
+        self._actors = self._host if setting.one_host else Shared(env)
         self._latency = 0.0 if setting.one_host else setting.latency
         levels = setting.relays
         between = setting.hub_bandwidth if levels else setting.bandwidth
@@ -86,35 +89,43 @@ class _Run:
             costs.part(setting.shards),
             clients=(*levels, setting.actors)[0],
             counted=self._counted,
-            max_lag=setting.max_lag,
+            most_lag=most_lag(costs, setting),
         )
         self._samples: list[Node] = []
-        """A relay of each level."""
+        """A relay of each level, one of those with most below it."""
         above: list[Node] = [self._learner]
         for relays, below in zip(levels, (*levels, setting.actors)[1:], strict=True):
             flow = setting.bandwidth if below == setting.actors else setting.hub_bandwidth
-            above = [self._make_relay(above[n % len(above)], flow, below // relays) for n in range(relays)]
+            # Those below take turns with those above, so the first ones have one more if it does not come out even.
+            above = [
+                self._make_relay(above[n % len(above)], flow, clients=-(-(below - n) // relays)) for n in range(relays)
+            ]
             self._samples.append(above[0])
         for number in range(setting.actors):
             env.process(self._actor(above[number % len(above)]))
 
     def measure(self) -> Prediction:
-        """Let it get under way, and measure it."""
+        """Let it get under way, and measure it; if it does not get on, all of it is measured."""
         updates = max(LEAST_UPDATES, UPDATES_PER_ACTOR * self._setting.actors)
         before = int(WARM_UP * updates)
-        self._run_until(before, before + updates, LONGEST_S / 2)
-        start, self._counted.lag_max = self._moment(), 0
-        self._run_until(before + updates, before + updates, LONGEST_S)
-        return self._prediction(start, self._moment())
+        start = self._moment()
+        gets_on = self._run_until(before, before + updates)
+        if gets_on:
+            start, self._counted.lag_max = self._moment(), 0
+            gets_on = self._run_until(before + updates, before + updates)
+        return self._prediction(start, self._moment(), gets_on=gets_on)
 
-    def _run_until(self, pushed: int, last: int, longest: float) -> None:
-        """Run until so many updates have been answered for good, or it is so late, seconds."""
-        self._until = pushed
-        while self._counted.pushed < pushed and self._env.now < longest:
+    def _run_until(self, answered: int, last: int) -> bool:
+        """Run until so many updates have been answered for good; False when the run stands still before."""
+        self._until = answered
+        while (so_far := self._counted.answered) < answered:
             self._goal = self._env.event()
-            self._env.run(self._goal | self._env.timeout(longest - self._env.now))
+            self._env.run(self._goal | self._env.timeout(STANDSTILL_S))
+            if self._counted.answered == so_far:
+                return False
             if self._progress is not None:
-                self._progress(self._counted.pushed / last)
+                self._progress(min(self._counted.answered / last, 1.0))
+        return True
 
     def _actor(self, above: Node) -> Process:
         """Fetch, roll out, push, again and again."""
@@ -139,8 +150,8 @@ class _Run:
 
     def _push(self, client: Client, push: Push) -> Process:
         yield from client.push(push)
-        self._counted.pushed += 1
-        if self._counted.pushed >= self._until or self._counted.pushed % _PROGRESS_EVERY == 0:
+        self._counted.answered += 1
+        if self._counted.answered >= self._until or self._counted.answered % _PROGRESS_EVERY == 0:
             self._answered()
 
     def _answered(self) -> None:
@@ -149,62 +160,72 @@ class _Run:
 
     def _make_link(self, flow: float) -> Link:
         bandwidth = math.inf if self._setting.one_host else self._setting.hub_bandwidth
-        return Link(self._env, bandwidth, flow, self._rng)
+        return Link(Way(self._env, bandwidth, flow, self._rng), Way(self._env, bandwidth, flow, self._rng))
 
-    def _make_relay(self, above: Node, flow: float, clients: int) -> Node:
-        host = Shared(self._env, self._setting.cores, self._costs.crowding)
+    def _make_relay(self, above: Node, flow: float, *, clients: int) -> Node:
+        host = Shared(self._env, self._setting.cores, crowding=self._costs.crowding)
         place = Place(self._env, host, self._make_link(flow), self._latency)
         return Relay(above, place, self._costs, clients=clients, counted=self._counted, rng=self._rng)
 
     def _moment(self) -> _Moment:
+        learner = self._learner
+        own = {name: getattr(learner, name) for name in ("version", "settled", "busy", "resent")}
         return _Moment(
             self._env.now,
             replace(self._counted),
-            self._learner.sent,
+            own | {"up": learner.link.up.bits, "down": learner.link.down.bits},
             self._actors.used(),
-            self._used_by(self._learner) | {"host": self._host.used() / self._setting.cores},
-            [self._used_by(relay) for relay in self._samples],
+            learner.lock_waited,
+            _used_by(learner) | {"host": self._host.used() / self._setting.cores},
+            [_used_by(relay) for relay in self._samples],
         )
 
-    @staticmethod
-    def _used_by(node: Node) -> dict[str, float]:
-        """Return the seconds in which each resource was fully used."""
-        link = node.link
-        return {
-            "apply": node.main_used,
-            "receive": node.receive_used,
-            "serve": node.serve_used,
-            "gil": node.lock_used,
-            "up": link.up.used() / link.up.units if math.isfinite(link.up.units) else 0.0,
-            "down": link.down.used() / link.down.units if math.isfinite(link.down.units) else 0.0,
-        }
-
-    def _prediction(self, start: _Moment, end: _Moment) -> Prediction:
+    def _prediction(self, start: _Moment, end: _Moment, *, gets_on: bool) -> Prediction:
         seconds = max(end.now - start.now, _TINY)
         count = {name: value - getattr(start.counted, name) for name, value in asdict(end.counted).items()}
-        applied, pushed = max(count["applied"], 1), max(count["pushed"], 1)
-        loads = {f"{name}_load": (used - start.used[name]) / seconds for name, used in end.used.items()}
+        own = {name: value - start.learner[name] for name, value in end.learner.items()}
+        used = {name: value - start.used[name] for name, value in end.used.items()}
         relays = [
-            (used - before[name]) / seconds
+            (value - before[name]) / seconds
             for before, after in zip(start.relays, end.relays, strict=True)
-            for name, used in after.items()
+            for name, value in after.items()
         ]
-        part = self._learner.costs
+        applied, settled = max(count["applied"], 1), max(own["settled"], 1)
+        worked = max(used["apply"] + used["receive"] + used["serve"], _TINY)
         cores = self._setting.cores if self._setting.one_host else self._setting.actors
         return Prediction(
             actors=self._setting.actors,
+            gets_on=gets_on,
             frames_per_second=count["frames"] / seconds,
-            updates_per_second=count["updates"] / seconds,
+            updates_per_second=own["version"] / seconds,
             lag=count["lags"] / applied,
             lag_max=self._counted.lag_max,
             age=count["ages"] / applied,
             stale=count["stale"] / max(count["stale"] + count["applied"], 1),
-            busy=count["busy"] / pushed,
-            resent=count["resent"] / pushed,
+            busy=own["busy"] / settled,
+            resent=own["resent"] / settled,
+            gil_wait=(end.waited - start.waited) / worked,
             actor_load=(end.actors - start.actors) / seconds / cores,
             relay_load=max(relays, default=None),
-            megabits_up=8e-6 * (end.sent - start.sent) * part.bytes_up / seconds,
-            megabits_down=8e-6 * count["fetched"] * part.bytes_down / seconds,
+            megabits_up=1e-6 * own["up"] / seconds,
+            megabits_down=1e-6 * own["down"] / seconds,
             simulated_seconds=seconds,
-            **loads,
+            **{f"{name}_load": value / seconds for name, value in used.items()},
         )
+
+
+def most_lag(costs: Costs, setting: Setting) -> int:
+    """Return the largest policy lag of a push that the learner applies, versions."""
+    return RunConfig(learn_from=costs.learn_from, max_lag=setting.max_lag).most_lag  # type: ignore[arg-type]  # checked
+
+
+def _used_by(node: Node) -> dict[str, float]:
+    """Return the seconds in which each resource of a node was fully used."""
+    return {
+        "apply": node.main_used,
+        "receive": node.receive_used,
+        "serve": node.serve_used,
+        "gil": node.lock_used,
+        "up": node.link.up.used(),
+        "down": node.link.down.used(),
+    }

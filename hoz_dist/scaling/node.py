@@ -3,8 +3,7 @@
 What it does with a push is another's to say; see `hoz_dist.scaling.learner` and `hoz_dist.scaling.relay`.
 """
 
-import math
-import random
+from collections import Counter
 from collections.abc import Generator
 from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
@@ -12,10 +11,8 @@ from typing import Any, Final, NamedTuple
 import simpy
 
 from hoz_dist.scaling.costs import Costs
-from hoz_dist.scaling.sharing import Shared, call
-
-Process = Generator[simpy.Event, Any, None]
-"""What a part of a process does in the course of time."""
+from hoz_dist.scaling.links import Connection, Link
+from hoz_dist.scaling.sharing import Process, Shared, call
 
 # As in the code; a test compares them.
 MOST_WAITING: Final = 32
@@ -48,55 +45,29 @@ class Answer(NamedTuple):
     version: int
 
 
-@dataclass(eq=False)
-class Request:
+class Request(NamedTuple):
     """A push on its way, and who waits for the answer."""
 
     push: Push
     reply: simpy.Event
-    arrived: float = 0.0
-
-
-class Link:
-    """A host's link: each way shared by what goes that way.
-
-    Args:
-        env: Simulation.
-        bandwidth: Bits/s; infinitely many for a loopback, whose cost is Zenoh's CPU time alone.
-        flow: Bits/s at which one message travels at most, because the other end's link is no faster.
-        rng: Source of the luck with which messages share it.
-    """
-
-    def __init__(self, env: simpy.Environment, bandwidth: float, flow: float, rng: random.Random) -> None:
-        units = math.inf if math.isinf(bandwidth) else bandwidth / flow
-        self.up, self.down = Shared(env, units, uneven=rng), Shared(env, units, uneven=rng)
-        self._flow = flow
-
-    def seconds(self, size: float) -> float:
-        """Return how long a message of some bytes takes when nothing else is under way."""
-        return 8.0 * size / self._flow
 
 
 @dataclass
 class Counted:
-    """What happened so far."""
+    """What became of the actors' updates so far."""
 
     frames: float = 0.0
-    updates: int = 0
-    lags: float = 0.0
-    """Sum over the actors' updates that were applied."""
-    ages: float = 0.0
+    """Of those that were applied."""
     applied: int = 0
-    """Actors' updates that were applied."""
     stale: int = 0
-    """Actors' updates that were refused."""
-    busy: int = 0
-    resent: int = 0
-    pushed: int = 0
-    """Actors' updates that were answered for good."""
+    """Those that were refused."""
+    answered: int = 0
+    """Those that somebody answered for good: the learner, or a relay."""
+    lags: float = 0.0
+    """Sum over those that were applied, versions."""
+    ages: float = 0.0
+    """The same, seconds."""
     lag_max: int = 0
-    fetched: int = 0
-    """Times that the learner served all parameters."""
 
 
 class Place(NamedTuple):
@@ -117,7 +88,7 @@ class Node:
         place: Where it runs.
         costs: What its stages take.
         clients: How many processes are told of new parameters.
-        counted: Where to count.
+        counted: Where to count what becomes of the actors' updates.
 
     Attributes:
         version: Of the newest parameters.
@@ -125,7 +96,10 @@ class Node:
         receive_used: The same of the thread that receives pushes.
         serve_used: The same of the thread that serves parameters.
         lock_used: Seconds in which the interpreter lock was held.
-        sent: Pushes that were sent to it.
+        lock_waited: Seconds in which threads that had work waited for it, in all.
+        settled: Pushes that it took or refused.
+        busy: Pushes that it told to come again.
+        resent: Pushes that came again because no answer came in time.
     """
 
     def __init__(self, place: Place, costs: Costs, *, clients: int, counted: Counted) -> None:
@@ -133,50 +107,53 @@ class Node:
         self.costs = costs
         self.counted = counted
         self._clients = clients
-        self.version = self.sent = 0
-        self.main_used = self.receive_used = self.serve_used = self.lock_used = 0.0
+        self.version = self.settled = self.busy = self.resent = 0
+        self.main_used = self.receive_used = self.serve_used = self.lock_used = self.lock_waited = 0.0
         self._lock = simpy.Resource(self.env)
         self._channel = simpy.Store(self.env)
         self._inbox = simpy.Store(self.env)
         self._serving = simpy.Resource(self.env)
         self._reading: dict[object, int] = {}
         """Version that each reader is at."""
+        self._readers: Counter[int] = Counter()
+        """How many are at each version."""
         self.env.process(self._receive())
         self.env.process(self._work())
 
     # --- what clients call ---
 
-    def send(self, push: Push, size: float) -> simpy.Event:
+    def send(self, push: Push, connection: Connection) -> simpy.Event:
         """Send a push; returns the event of its answer."""
-        self.sent += 1
         request = Request(push, self.env.event())
-        sent = self.link.up.use(self.link.seconds(size))
-        assert sent.callbacks is not None  # noqa: S101 - it has not happened yet
-        sent.callbacks.append(lambda _: call(self.env, self.latency, self._channel.put, request))
+        self.env.process(self._carry(request, connection))
         return request.reply
 
     def begin(self, reader: object) -> int | None:
         """Begin to read the newest version; None when no more can be kept."""
-        versions = {*self._reading.values(), self.version}
-        full = len(self._reading) >= MOST_READERS or len(versions) * 4 * self.costs.parameters > MOST_VERSION_BYTES
-        if full and len(self._reading) > 0:
+        versions = len(self._readers) + (self.version not in self._readers)
+        full = len(self._reading) >= MOST_READERS or versions * self.costs.bytes_down > MOST_VERSION_BYTES
+        if full and self._reading:
             return None
         self._reading[reader] = self.version
+        self._readers[self.version] += 1
         return self.version
 
-    def serve(self, share: float) -> Process:
+    def serve(self, share: float, connection: Connection) -> Process:
         """Answer a reader with a share of the parameters."""
         with self._serving.request() as turn:
             yield turn
             began = self.env.now
-            yield from self._compute(share * self.costs.serve)
+            yield from self._compute(self.costs.serve, share)
             self.serve_used += self.env.now - began
-        self.host.use(share * self._wire_down)  # by other threads; nobody waits for all of it
-        yield self.link.down.use(self.link.seconds(share * self.costs.bytes_down))
+        self.host.use(share * (1.0 - self.costs.up_share) * self.costs.learner_wire)  # by other threads; nobody waits
+        yield from connection.down(share * self.costs.bytes_down)
 
     def end(self, reader: object) -> None:
         """End to read."""
-        self._reading.pop(reader, None)
+        version = self._reading.pop(reader)
+        self._readers[version] -= 1
+        if not self._readers[version]:
+            del self._readers[version]
 
     # --- what it does ---
 
@@ -184,48 +161,52 @@ class Node:
         """Take a push; the main thread's work."""
         raise NotImplementedError
 
+    def _carry(self, request: Request, connection: Connection) -> Process:
+        yield from connection.up(self.costs.bytes_up)
+        call(self.env, self.latency, self._channel.put, request)
+
     def _receive(self) -> Process:
         """Check pushes, and let them wait, or tell them to come again."""
         while True:
             request: Request = yield self._channel.get()
             began = self.env.now
-            self.host.use(self._wire_up)  # by other threads
+            self.host.use(self.costs.up_share * self.costs.learner_wire)  # by other threads
             yield from self._compute(self.costs.receive)
             self.receive_used += self.env.now - began
             waiting = len(self._inbox.items)
             if waiting and (waiting >= MOST_WAITING or (waiting + 1) * self.costs.bytes_up > MOST_WAITING_BYTES):
                 self._put_off(request)
             else:
-                request.arrived = self.env.now
                 self._inbox.put(request)
+                call(self.env, LONGEST_WAIT_S, self._put_off_late, request)
 
     def _work(self) -> Process:
         """Handle pushes one by one."""
         while True:
             request: Request = yield self._inbox.get()
-            if self.env.now - request.arrived > LONGEST_WAIT_S:
-                self._put_off(request)
-                continue
             began = self.env.now
             if request.push.is_done:
                 answer = Answer("accepted", self.version)
             else:
                 request.push.is_done = True
+                self.settled += 1
                 answer = yield from self.handle(request.push)
             self._answer(request, answer)
             yield from self._compute(self._afterwards)
             self.main_used += self.env.now - began
 
-    def _compute(self, seconds: float) -> Process:
-        """Work in a Python thread: a share of the time with the interpreter lock."""
-        held = seconds * self.costs.gil
+    def _compute(self, seconds: float, share: float = 1.0) -> Process:
+        """Go through a share of a stage in a Python thread: first with the interpreter lock, then without."""
+        held = self.costs.held(seconds)
         if held > 0.0:
+            asked = self.env.now
             with self._lock.request() as turn:
                 yield turn
                 began = self.env.now
-                yield self.host.use(held)
+                self.lock_waited += began - asked
+                yield self.host.use(share * held)
                 self.lock_used += self.env.now - began
-        yield self.host.use(seconds - held)
+        yield self.host.use(share * (seconds - held))
 
     def _publish(self) -> Process:
         """Make new parameters known."""
@@ -233,8 +214,14 @@ class Node:
         yield self.host.use(self._clients * self.costs.notify)
         self.host.use(self._clients * self.costs.notify_wire)  # nobody waits for it
 
+    def _put_off_late(self, request: Request) -> None:
+        """Tell a push that still waits to come again."""
+        if request in self._inbox.items:
+            self._inbox.items.remove(request)
+            self._put_off(request)
+
     def _put_off(self, request: Request) -> None:
-        self.counted.busy += 1
+        self.busy += 1
         self._answer(request, Answer("busy", self.version))
 
     def _answer(self, request: Request, answer: Answer) -> None:
@@ -244,13 +231,3 @@ class Node:
     def _afterwards(self) -> float:
         """Time of the main thread for a push that was answered already."""
         return 0.0
-
-    @property
-    def _wire_up(self) -> float:
-        """Zenoh's time for a push."""
-        return self.costs.learner_wire * self.costs.bytes_up / (self.costs.bytes_up + self.costs.bytes_down)
-
-    @property
-    def _wire_down(self) -> float:
-        """Zenoh's time for all parameters."""
-        return self.costs.learner_wire - self._wire_up

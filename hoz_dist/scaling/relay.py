@@ -8,7 +8,8 @@ import simpy
 
 from hoz_dist.scaling.client import Client
 from hoz_dist.scaling.costs import Costs
-from hoz_dist.scaling.node import Answer, Counted, Node, Place, Process, Push
+from hoz_dist.scaling.node import Answer, Counted, Node, Place, Push
+from hoz_dist.scaling.sharing import Process
 
 SUMMING: Final = 3.0 / 7.0
 """Adding a vector to another one passes 3 times over memory of the parameters' size; Adam reads 4 and writes 3."""
@@ -17,12 +18,15 @@ SUMMING: Final = 3.0 / 7.0
 class Relay(Node):
     """A relay below a node; it has one push under way at a time.
 
+    The learner makes one step of the sum, whose norm is bounded (`RunConfig.gradient_norm`): a run with relays makes
+    fewer updates of as many frames, which the model counts apart, and learns otherwise, which it does not know.
+
     Args:
         above: The node that it pushes to.
         place: Where it runs, with the link to its actors.
         costs: Of one update, and of serving all parameters.
         clients: Number of its actors.
-        counted: Where to count.
+        counted: Where to count what becomes of the actors' updates.
         rng: Source of the pauses.
     """
 

@@ -27,7 +27,8 @@ class Setting:
     learner_bandwidth: float | None = None
     """Of the links of learners and relays, each way, bits/s; None for that of an actor."""
     max_lag: int = 32
-    """Largest policy lag at which a gradient is applied, versions."""
+    """``--max-lag``, versions: the largest policy lag at which a gradient is applied; rollouts may have about twice as
+    much, see `RunConfig.most_lag`."""
     shards: int = 1
     """S, learners over which the parameters are split; each has a host."""
     fan_out: int | None = None
@@ -67,7 +68,7 @@ _RANGES: Final = (
     ("latency", 0.0, 10.0),
     ("bandwidth", 1e3, 1e15),
     ("learner_bandwidth", 1e3, 1e15),
-    ("max_lag", 0, 1_000_000),
+    ("max_lag", 0, 100_000),
     ("shards", 1, 4096),
     ("fan_out", 2, 100_000),
 )
@@ -79,9 +80,12 @@ class Prediction:
     """What a run would do once it is under way. Loads are shares of the time, in [0, 1]."""
 
     actors: int
+    gets_on: bool
+    """False when in an hour nothing was answered for good: then the figures are of what was simulated until then."""
     frames_per_second: float
     """Of gradients that are applied."""
     updates_per_second: float
+    """New versions of the parameters; with relays each is of many gradients."""
     lag: float
     """Policy lag of applied gradients, versions; mean."""
     lag_max: int
@@ -90,9 +94,11 @@ class Prediction:
     stale: float
     """Share of gradients that are refused because of their lag."""
     busy: float
-    """Busy answers a gradient."""
+    """Times that the learner tells a push to come again."""
     resent: float
-    """Gradients that are sent again because no answer came in time, a gradient."""
+    """Times that a push to the learner is sent again because no answer came in time."""
+    gil_wait: float
+    """Share of the time in which the learner's threads have work that they wait for the interpreter lock."""
     actor_load: float
     """Of an actor, computing."""
     apply_load: float
@@ -112,7 +118,7 @@ class Prediction:
     relay_load: float | None
     """Of the busiest resource of a relay; None without relays."""
     megabits_up: float
-    """To the learner, Mbit/s."""
+    """That arrive at the learner, Mbit/s."""
     megabits_down: float
     """From the learner, Mbit/s."""
     simulated_seconds: float

@@ -2,11 +2,14 @@
 
 import math
 import random
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from heapq import heappop, heappush
 from typing import Any, Final
 
 import simpy
+
+Process = Generator[simpy.Event, Any, None]
+"""What something does in the course of time."""
 
 UNEVEN: Final = 0.5
 """How much more or less than their share some get where it is uneven."""
@@ -24,17 +27,18 @@ class Shared:
     Args:
         env: Simulation.
         units: How many users go at full speed; need not be whole. Infinitely many: one for each user.
-        crowding: Share by which work takes longer while all units are in use; cores share caches and memory.
         uneven: Source of luck, for users that do not share exactly evenly, as flows of TCP: those that come at the same
             moment would otherwise be done at the same moment, and stay in step for ever. None for exact shares.
+        crowding: Share by which work takes longer while all units are in use, if they are not infinitely many; cores
+            share caches and memory.
     """
 
     def __init__(
         self,
         env: simpy.Environment,
         units: float = math.inf,
-        crowding: float = 0.0,
         uneven: random.Random | None = None,
+        crowding: float = 0.0,
     ) -> None:
         self._env = env
         self.units = units
@@ -56,7 +60,6 @@ class Shared:
             work: Seconds that it takes on a unit of its own.
         """
         if math.isinf(self.units):
-            work *= 1.0 + self._crowding
             self._used += work
             return self._env.timeout(work)
         self._get_on()

@@ -20,4 +20,4 @@ def costs(**values: Any) -> Costs:
 
 def setting(**values: Any) -> Setting:
     """Many cores, no latency and links that do not matter."""
-    return Setting(**({"actors": 1, "cores": 4096, "latency": 0.0, "bandwidth": 1e15, "max_lag": 1_000_000} | values))
+    return Setting(**({"actors": 1, "cores": 4096, "latency": 0.0, "bandwidth": 1e15, "max_lag": 100_000} | values))

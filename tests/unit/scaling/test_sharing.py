@@ -17,7 +17,7 @@ def ends(units: float, begins: list[tuple[float, float]], crowding: float = 0.0)
         crowding: See `Shared`.
     """
     env = simpy.Environment()
-    shared = Shared(env, units, crowding)
+    shared = Shared(env, units, crowding=crowding)
     done = [0.0] * len(begins)
 
     def user(number: int, begin: float, work: float) -> simpy.events.ProcessGenerator:
@@ -28,7 +28,7 @@ def ends(units: float, begins: list[tuple[float, float]], crowding: float = 0.0)
     for number, (begin, work) in enumerate(begins):
         env.process(user(number, begin, work))
     env.run()
-    assert shared.used() == pytest.approx(sum(work for _, work in begins) * (1 + crowding))
+    assert shared.used() == pytest.approx(sum(work for _, work in begins))
     return done
 
 
@@ -51,7 +51,7 @@ def test_units_need_not_be_whole() -> None:
 
 
 def test_infinitely_many_units_are_one_for_each() -> None:
-    assert ends(math.inf, [(0, 1), (0, 2)], crowding=0.5) == pytest.approx([1.5, 3])
+    assert ends(math.inf, [(0, 1), (0, 2)], crowding=0.5) == pytest.approx([1, 2])
 
 
 def test_no_work_takes_no_time() -> None:
