@@ -47,20 +47,10 @@ def train_in_process(
     """
     torch.set_num_threads(1)
     os.setsid()  # as actors have one each: Linux divides processors between sessions first
-    rng = np.random.default_rng([config.seed, zlib.crc32(name.encode())])
-    clock, env = StageClock(), BatchEnv(config.batch, rng)
-    collector = Collector(config, env, rng, clock)
+    clock = StageClock()
     adam = FlatAdam(initial_parameters(config.policy, config.seed), config.learning_rate)
-    graphs = GraphStore(config.zones, {})
-    encoder = matching_encoder(config, weights)
-    preparation = RoomPreparation(rooms, ViewStore(cache, config.picture_size), encoder, zones=config.zones, actor=name)
     ready()
-    while preparation.waiting:
-        room = preparation.next()
-        graphs.add(room.graph)
-        env.add_room(room.views)
-    for graph in graphs.scenes.values():
-        collector.use_graph(graph)
+    (collector,) = collectors_in(config, rooms, cache, weights, [name], clock)
     frames = 0
     with Timings(timings, clock) as lines:
         while not stopped(0.0):
@@ -72,3 +62,39 @@ def train_in_process(
                 adam.step(update.gradient)
             frames += update.frames
             lines.update(frames, rooms_waiting=0)
+
+
+def collectors_in(
+    config: RunConfig,
+    rooms: Sequence[RoomId],
+    cache: Path,
+    weights: Path | None,
+    names: Sequence[str],
+    clock: StageClock | None = None,
+) -> list[Collector]:
+    """Make a collector for each of some actors, all in the same rooms, which are explored once.
+
+    Args:
+        config: Configuration of the run.
+        rooms: Rooms to train in.
+        cache: The view cache.
+        weights: Weights of the encoder.
+        names: Names of the actors; they seed the episodes.
+        clock: Measures the stages of all of them; None for none.
+    """
+    store, encoder = ViewStore(cache, config.picture_size), matching_encoder(config, weights)
+    preparation = RoomPreparation(rooms, store, encoder, zones=config.zones, actor=names[0])
+    ready = [preparation.next() for _ in rooms]
+    graphs = GraphStore(config.zones, {})
+    for room in ready:
+        graphs.add(room.graph)
+    collectors = []
+    for name in names:
+        rng = np.random.default_rng([config.seed, zlib.crc32(name.encode())])
+        env = BatchEnv(config.batch, rng)
+        for room in ready:
+            env.add_room(room.views)
+        collectors.append(Collector(config, env, rng, clock))
+        for graph in graphs.scenes.values():
+            collectors[-1].use_graph(graph)
+    return collectors

@@ -16,17 +16,13 @@ import torch
 
 from hoz_dist.a3c.compression.compressor import Compressor
 from hoz_dist.a3c.compression.decompressor import Decompressor
+from hoz_dist.bench.loop import collectors_in
 from hoz_dist.config import Compression, RunConfig
-from hoz_dist.evaluation.loading import matching_encoder
 from hoz_dist.gradient_forms import Vector
 from hoz_dist.nav.rooms import RoomId, training_rooms
 from hoz_dist.policy.parameters import initial_parameters
-from hoz_dist.sim.batch_env import BatchEnv
-from hoz_dist.sim.view_store import ViewStore, default_cache
-from learner.graph_store import GraphStore
+from hoz_dist.sim.view_store import default_cache
 from learner.optimizer import FlatAdam, lag_weight
-from workers.collector import Collector
-from workers.preparation import RoomPreparation
 
 EPISODES: Final = 3000
 """Last episodes whose success is told."""
@@ -46,24 +42,12 @@ class Line(NamedTuple):
 
 def train(config: RunConfig, rooms: Sequence[RoomId], actors: int, updates: int) -> Iterator[Line]:
     """Train; yields every so many updates."""
-    store, encoder = ViewStore(default_cache(), config.picture_size), matching_encoder(config, None)
-    preparation = RoomPreparation(rooms, store, encoder, zones=config.zones, actor="codecs")
-    ready = [preparation.next() for _ in rooms]
-    graphs = GraphStore(config.zones, {})
-    for room in ready:
-        graphs.add(room.graph)
     adam = FlatAdam(initial_parameters(config.policy, config.seed), config.learning_rate)
     decompressor = Decompressor(adam.size)
-    collectors, compressors, errors = [], [], [np.zeros(adam.size, np.float32) for _ in range(actors)]
-    for number in range(actors):
-        rng = np.random.default_rng([config.seed, number])
-        env = BatchEnv(config.batch, rng)
-        for room in ready:
-            env.add_room(room.views)
-        collectors.append(Collector(config, env, rng))
-        for graph in graphs.scenes.values():
-            collectors[-1].use_graph(graph)
-        compressors.append(Compressor(config.compress, adam.size, config.gradient_norm))
+    names = [f"actor-{number}" for number in range(actors)]
+    collectors = collectors_in(config, rooms, default_cache(), None, names)
+    compressors = [Compressor(config.compress, adam.size, config.gradient_norm) for _ in names]
+    errors = [np.zeros(adam.size, np.float32) for _ in names]
     waiting: deque[tuple[int, int, Vector]] = deque()
     ended: deque[bool] = deque(maxlen=EPISODES)
     for update in range(updates):
