@@ -77,8 +77,8 @@ def print_table(rows: Sequence[Row]) -> None:
     for row in rows:
         one = row.prediction
         figures = (
-            f"{one.frames_per_second:,.0f}",
-            f"{one.updates_per_second:,.3g}",
+            _figure(one.frames_per_second),
+            _figure(one.updates_per_second),
             f"{one.lag:.1f}",
             f"{one.age:.2g} s",
             f"{one.stale:.0%}",
@@ -89,8 +89,8 @@ def print_table(rows: Sequence[Row]) -> None:
             f"{one.actors:,}",
             *(figures if one.gets_on else ("stands still", *["-"] * (len(figures) - 1))),
             f"{one.apply_load:.0%}",
-            f"{one.megabits_up:,.0f}",
-            f"{one.megabits_down:,.0f}",
+            _figure(one.megabits_up),
+            _figure(one.megabits_down),
             one.bottleneck,
         )
     console = Console(highlight=False)
@@ -98,3 +98,8 @@ def print_table(rows: Sequence[Row]) -> None:
     click.echo(_LEGEND)
     if not all(row.prediction.gets_on for row in rows):
         click.echo("stands still: nothing that was pushed was answered for an hour of simulated time.")
+
+
+def _figure(value: float) -> str:
+    """Write a figure with at least two digits."""
+    return f"{value:,.0f}" if value >= 10 or value == 0 else f"{value:.2g}"  # noqa: PLR2004

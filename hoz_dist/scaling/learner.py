@@ -28,10 +28,10 @@ class Learner(Node):
         """Refuse a push that is stale; apply the others, and publish the parameters."""
         counted, lag = self.counted, self.version - push.version
         if lag > self._most_lag:
-            yield from self._compute(self.costs.fixed)
+            yield from self._compute(self.main, self.costs.fixed)
             counted.stale += push.count
             return Answer("stale", self.version)
-        yield from self._compute(self.costs.apply)
+        yield from self._compute(self.main, self.costs.apply)
         yield from self._publish()
         self.version += 1
         counted.frames += push.frames

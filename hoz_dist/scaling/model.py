@@ -57,7 +57,7 @@ class _Moment:
     actors: float
     """Seconds of the actors' cores."""
     waited: float
-    """Seconds in which the learner's threads waited for the interpreter lock."""
+    """Seconds in which the learner's threads waited for the interpreter lock, in all."""
     used: dict[str, float]
     """Seconds in which each of the learner's resources was fully used."""
     relays: list[dict[str, float]]
@@ -175,7 +175,7 @@ class _Run:
             replace(self._counted),
             own | {"up": learner.link.up.bits, "down": learner.link.down.bits},
             self._actors.used(),
-            learner.lock_waited,
+            sum(thread.waited for thread in (learner.main, learner.receiver, learner.server)),
             _used_by(learner) | {"host": self._host.used() / self._setting.cores},
             [_used_by(relay) for relay in self._samples],
         )
@@ -191,7 +191,8 @@ class _Run:
             for name, value in after.items()
         ]
         applied, settled = max(count["applied"], 1), max(own["settled"], 1)
-        worked = max(used["apply"] + used["receive"] + used["serve"], _TINY)
+        waited = end.waited - start.waited
+        had_work = max(used["apply"] + used["receive"] + used["serve"] + waited, _TINY)
         cores = self._setting.cores if self._setting.one_host else self._setting.actors
         return Prediction(
             actors=self._setting.actors,
@@ -204,7 +205,7 @@ class _Run:
             stale=count["stale"] / max(count["stale"] + count["applied"], 1),
             busy=own["busy"] / settled,
             resent=own["resent"] / settled,
-            gil_wait=(end.waited - start.waited) / worked,
+            gil_wait=waited / had_work,
             actor_load=(end.actors - start.actors) / seconds / cores,
             relay_load=max(relays, default=None),
             megabits_up=1e-6 * own["up"] / seconds,
@@ -222,9 +223,9 @@ def most_lag(costs: Costs, setting: Setting) -> int:
 def _used_by(node: Node) -> dict[str, float]:
     """Return the seconds in which each resource of a node was fully used."""
     return {
-        "apply": node.main_used,
-        "receive": node.receive_used,
-        "serve": node.serve_used,
+        "apply": node.main.worked,
+        "receive": node.receiver.worked,
+        "serve": node.server.worked,
         "gil": node.lock_used,
         "up": node.link.up.used(),
         "down": node.link.down.used(),

@@ -53,6 +53,16 @@ class Request(NamedTuple):
 
 
 @dataclass
+class Thread:
+    """A Python thread of a node."""
+
+    worked: float = 0.0
+    """Seconds in which it got on, or wanted a core; without those in which it waited for the interpreter lock."""
+    waited: float = 0.0
+    """Seconds in which it waited for that."""
+
+
+@dataclass
 class Counted:
     """What became of the actors' updates so far."""
 
@@ -92,11 +102,10 @@ class Node:
 
     Attributes:
         version: Of the newest parameters.
-        main_used: Seconds in which the main thread had work.
-        receive_used: The same of the thread that receives pushes.
-        serve_used: The same of the thread that serves parameters.
+        main: The main thread, which handles pushes.
+        receiver: The thread that receives pushes.
+        server: The thread that serves parameters.
         lock_used: Seconds in which the interpreter lock was held.
-        lock_waited: Seconds in which threads that had work waited for it, in all.
         settled: Pushes that it took or refused.
         busy: Pushes that it told to come again.
         resent: Pushes that came again because no answer came in time.
@@ -108,7 +117,8 @@ class Node:
         self.counted = counted
         self._clients = clients
         self.version = self.settled = self.busy = self.resent = 0
-        self.main_used = self.receive_used = self.serve_used = self.lock_used = self.lock_waited = 0.0
+        self.main, self.receiver, self.server = Thread(), Thread(), Thread()
+        self.lock_used = 0.0
         self._lock = simpy.Resource(self.env)
         self._channel = simpy.Store(self.env)
         self._inbox = simpy.Store(self.env)
@@ -142,9 +152,7 @@ class Node:
         """Answer a reader with a share of the parameters."""
         with self._serving.request() as turn:
             yield turn
-            began = self.env.now
-            yield from self._compute(self.costs.serve, share)
-            self.serve_used += self.env.now - began
+            yield from self._compute(self.server, self.costs.serve, share)
         self.host.use(share * (1.0 - self.costs.up_share) * self.costs.learner_wire)  # by other threads; nobody waits
         yield from connection.down(share * self.costs.bytes_down)
 
@@ -169,10 +177,8 @@ class Node:
         """Check pushes, and let them wait, or tell them to come again."""
         while True:
             request: Request = yield self._channel.get()
-            began = self.env.now
             self.host.use(self.costs.up_share * self.costs.learner_wire)  # by other threads
-            yield from self._compute(self.costs.receive)
-            self.receive_used += self.env.now - began
+            yield from self._compute(self.receiver, self.costs.receive)
             waiting = len(self._inbox.items)
             if waiting and (waiting >= MOST_WAITING or (waiting + 1) * self.costs.bytes_up > MOST_WAITING_BYTES):
                 self._put_off(request)
@@ -184,7 +190,6 @@ class Node:
         """Handle pushes one by one."""
         while True:
             request: Request = yield self._inbox.get()
-            began = self.env.now
             if request.push.is_done:
                 answer = Answer("accepted", self.version)
             else:
@@ -192,26 +197,31 @@ class Node:
                 self.settled += 1
                 answer = yield from self.handle(request.push)
             self._answer(request, answer)
-            yield from self._compute(self._afterwards)
-            self.main_used += self.env.now - began
+            yield from self._compute(self.main, self._afterwards)
 
-    def _compute(self, seconds: float, share: float = 1.0) -> Process:
-        """Go through a share of a stage in a Python thread: first with the interpreter lock, then without."""
+    def _compute(self, thread: Thread, seconds: float, share: float = 1.0) -> Process:
+        """Go through a share of a stage: first with the interpreter lock, then without."""
         held = self.costs.held(seconds)
         if held > 0.0:
             asked = self.env.now
             with self._lock.request() as turn:
                 yield turn
+                thread.waited += self.env.now - asked
                 began = self.env.now
-                self.lock_waited += began - asked
-                yield self.host.use(share * held)
+                yield from self._use(thread, share * held)
                 self.lock_used += self.env.now - began
-        yield self.host.use(share * (seconds - held))
+        yield from self._use(thread, share * (seconds - held))
+
+    def _use(self, thread: Thread, seconds: float) -> Process:
+        """Let a thread compute."""
+        began = self.env.now
+        yield self.host.use(seconds)
+        thread.worked += self.env.now - began
 
     def _publish(self) -> Process:
         """Make new parameters known."""
-        yield from self._compute(self.costs.publish)
-        yield self.host.use(self._clients * self.costs.notify)
+        yield from self._compute(self.main, self.costs.publish)
+        yield from self._use(self.main, self._clients * self.costs.notify)
         self.host.use(self._clients * self.costs.notify_wire)  # nobody waits for it
 
     def _put_off_late(self, request: Request) -> None:

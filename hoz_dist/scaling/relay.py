@@ -41,7 +41,7 @@ class Relay(Node):
 
     def handle(self, push: Push) -> Generator[simpy.Event, Any, Answer]:
         """Add a push to those that wait to be sent on."""
-        yield from self._compute(SUMMING * self.costs.apply)
+        yield from self._compute(self.main, SUMMING * self.costs.apply)
         self._sum = _added(self._sum, push)
         if not self._came.triggered:
             self._came.succeed()

@@ -102,7 +102,7 @@ class Prediction:
     actor_load: float
     """Of an actor, computing."""
     apply_load: float
-    """Of the learner's own thread."""
+    """Of the learner's own thread; what it waits for the interpreter lock does not count, as in the next two."""
     receive_load: float
     """Of the learner's thread that receives gradients."""
     serve_load: float
@@ -127,7 +127,7 @@ class Prediction:
     def bottleneck(self) -> str:
         """What is fullest; ``waiting`` when nothing is nearly full: then messages are under way most of the time."""
         name, load = max(((name, load) for name, load in self._loads().items()), key=lambda one: one[1])
-        return name if load >= _FULL else "waiting"
+        return name if load >= _FULL or not self.gets_on else "waiting"
 
     def to_json(self) -> dict[str, Any]:
         """Return it as JSON values."""
