@@ -101,7 +101,7 @@ def train_command(
         loops = partial(_in_process, config, rooms, folder, weights, logs)
         alone = {"in process": stack.enter_context(loops(counts[0]))}
         with Progress("Getting ready", 1.0, None) as progress:
-            for number, (name, trainers) in enumerate((runs | alone).items()):
+            for number, (name, trainers) in enumerate((alone | runs).items()):
                 trainers.resume()
                 for ready in trainers.await_rooms():
                     progress.update((number + ready / len(trainers.files)) / (len(runs) + 1), name)
