@@ -207,6 +207,21 @@ def metrics_of(run: Measured, alone: Measured | None, suffix: str = "") -> dict[
     return {f"{name}{suffix}": metric for name, metric in metrics.items()}
 
 
+def prediction_metrics(run: Measured, predicted: float, suffix: str) -> dict[str, Metric]:
+    """Return how a prediction compares with a run.
+
+    Args:
+        run: The run.
+        predicted: Its predicted frames per second.
+        suffix: Of the names of the figures.
+    """
+    ratios = [predicted / window.frames_per_second for window in run.windows]
+    return {
+        f"predicted_frames_per_second{suffix}": Metric.of([predicted], "frames/s"),
+        f"prediction_ratio{suffix}": Metric.of(ratios, "x measured", 1.0),
+    }
+
+
 def bottleneck(run: Measured) -> str:
     """Name the stage that a run waits for most, such as ``actor differentiate``.
 

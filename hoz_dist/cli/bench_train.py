@@ -77,7 +77,7 @@ def train_command(
         raise InvalidValueError(message)
 
     from hoz_dist.atomic import check_writable, write_atomically
-    from hoz_dist.bench.training import bottleneck, measure_in_turns, metrics_of
+    from hoz_dist.bench.training import bottleneck, measure_in_turns, metrics_of, prediction_metrics
     from hoz_dist.cli.launch import sharing
     from hoz_dist.cli.progress import Progress
     from hoz_dist.cli.rendering import Encoding, render_rooms
@@ -120,16 +120,12 @@ def train_command(
         metrics |= metrics_of(measured[_name(count)], None, f"_a{count}")
     if costs is not None:
         from hoz_dist.bench.costs import measured_costs
-        from hoz_dist.bench.report import Metric
 
         command = command_line(click.get_current_context())
         found = measured_costs(config, measured[_name(1)], measured[_name(2)], jobs, command)
         write_atomically(costs, found.to_text().encode(), overwrite=force)
         for count in counts:
-            predicted = _predicted(found, count, jobs)
-            ratios = [predicted / window.frames_per_second for window in measured[_name(count)].windows]
-            metrics[f"predicted_frames_per_second_a{count}"] = Metric.of([predicted], "frames/s")
-            metrics[f"prediction_ratio_a{count}"] = Metric.of(ratios, "x measured", 1.0)
+            metrics |= prediction_metrics(measured[_name(count)], _predicted(found, count, jobs), f"_a{count}")
     show_metrics(metrics, as_json=as_json, more={"bottleneck": bottleneck(measured[first])})
 
 

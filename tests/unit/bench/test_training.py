@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from hoz_dist.bench.timings import TimingsFile, between, totals_of
-from hoz_dist.bench.training import Measured, Trainers, Window, bottleneck, metrics_of
+from hoz_dist.bench.training import Measured, Trainers, Window, bottleneck, metrics_of, prediction_metrics
 from hoz_dist.errors import HozError
 
 LEARNER = {"receive": 0.2, "apply": 0.3, "idle": 5.0}
@@ -89,6 +89,13 @@ def test_figures_are_of_an_update_and_the_rest_is_other() -> None:
     assert found["learner_apply_ms"].median == 60.0
     assert (found["actor_cpu_ms"].median, found["learner_cpu_ms"].median) == (800.0, 200.0)
     assert all(name.endswith("_a4") for name in metrics_of(measured(act=1.0), None, "_a4"))
+
+
+def test_a_prediction_is_compared_with_what_was_measured() -> None:
+    found = prediction_metrics(measured(act=5.0), 60.0, "_a4")
+    predicted, ratio = found["predicted_frames_per_second_a4"], found["prediction_ratio_a4"]
+    assert (predicted.median, predicted.limit) == (60.0, None)
+    assert (ratio.median, ratio.limit) == (1.2, 1.0)
 
 
 def test_what_goes_on_while_the_actor_acts_is_none_of_its_time() -> None:
