@@ -24,8 +24,8 @@ POLL_S: Final = 1.0
 def sharing(preset: Preset, *, wanted: bool | None = None) -> list[str]:
     """Return the further options of a learner and actors that share a machine.
 
-    They hand over messages of tens of megabytes through shared memory, which takes a third of the time. Those of a
-    small network gain little, and Zenoh keeps the memory of killed actors; see docs/decisions/shared-memory.md.
+    They hand over messages of tens of megabytes through shared memory, which is faster. Those of a small network gain
+    little, and Zenoh keeps the memory of killed actors; see docs/decisions/shared-memory.md.
 
     Args:
         preset: Size of the network.
