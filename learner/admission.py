@@ -37,7 +37,7 @@ class Admission:
         """Return why a push cannot be learnt from; None when it can, unless what is computed from it cannot.
 
         Args:
-            push: The push; its numbers are finite, since a message with others cannot be made.
+            push: The push; its numbers are finite, but for those of a gradient in full.
             version: Of the newest parameters.
             finished: Whether the budget is used up.
         """

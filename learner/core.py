@@ -9,6 +9,7 @@ parameter version counts the updates; the lag of a push is how many versions the
 that it was computed or acted on.
 """
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final
 
@@ -224,6 +225,9 @@ class LearnerCore:
             return
         vector, norm = self._decompressor.decompress(push.gradient, lag_weight(self.version - push.version))
         bound = self.config.gradient_norm
+        if not math.isfinite(norm):
+            yield self._refuse(request, Reason.NONFINITE, "gradient holds NaN or infinity")
+            return
         # Actors scale their gradients down; what exceeds the bound by more than rounding is not one of theirs.
         if norm > bound * (1.0 + NORM_TOLERANCE):
             yield self._refuse(request, Reason.NORM, f"norm {norm:.6g}, the bound is {bound:g}")

@@ -37,7 +37,7 @@ class Decompressor:
         """Return the entries of a gradient and its norm.
 
         Args:
-            gradient: Of P entries, finite, as checked when it was received; left as it is.
+            gradient: Of P entries; left as it is. If one is not finite, neither is the norm.
             weight: Factor of the entries, from 0 (excluded) to 1.
         """
         match gradient:

@@ -165,7 +165,7 @@ class OneOf(Scalar):
 
 @dataclasses.dataclass(frozen=True)
 class Tensor:
-    """An array of finite numbers.
+    """An array of numbers, finite ones unless said otherwise.
 
     Attributes:
         dtype: Name of the element type in `DTYPES`.
@@ -175,6 +175,7 @@ class Tensor:
         high: Largest element allowed.
         bulk: Whether the elements stand behind the message's map instead of in it; see `hoz_dist.wire.protocol.bulk`.
             For `bfloat16` there are neither bounds.
+        finite: Whether every element must be finite; False where who receives the array finds that out anyway.
     """
 
     dtype: str
@@ -183,6 +184,7 @@ class Tensor:
     low: float = -math.inf
     high: float = math.inf
     bulk: bool = False
+    finite: bool = True
 
     DESCRIPTION: ClassVar[frozenset[str]] = frozenset({"dtype", "shape"})
     FIELDS: ClassVar[frozenset[str]] = DESCRIPTION | {"data"}
@@ -244,7 +246,7 @@ class Tensor:
             raise RejectedError(Reason.SHAPE, f"{where} has the shape {value.shape}, not {self.rank} filled axes")
         if value.size > self.most:
             raise RejectedError(Reason.SIZE, f"{where} has {value.size} elements, more than {self.most}")
-        if not (_all_finite_halves(value) if self.dtype == "bfloat16" else _all_finite(value)):
+        if self.finite and not (_all_finite_halves(value) if self.dtype == "bfloat16" else _all_finite(value)):
             raise RejectedError(Reason.NONFINITE, f"{where} holds NaN or infinity")
         if (self.low > -math.inf and value.min() < self.low) or (self.high < math.inf and value.max() > self.high):
             raise RejectedError(Reason.RANGE, f"{where} has an element that is not in {self.low}..{self.high}")

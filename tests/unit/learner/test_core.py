@@ -107,6 +107,12 @@ def of_norm(norm: float) -> Float32:
     return (direction * (norm / np.linalg.norm(direction))).astype(np.float32)
 
 
+def spoilt(wrong: float) -> Float32:
+    values = vector(0)
+    values[-1] = wrong
+    return values
+
+
 def test_a_gradient_at_the_bound_of_its_norm_is_taken_with_its_rounding() -> None:
     core = new_core()
     (reply,) = push(core, gradient(0, values=of_norm(1.0001 * CONFIG.gradient_norm)))
@@ -123,12 +129,14 @@ def test_a_gradient_at_the_bound_of_its_norm_is_taken_with_its_rounding() -> Non
         (gradient(0, epoch=3, values=vector(0, SIZE - 1)), Reason.SHAPE),
         (gradient(0, epoch=3, values=of_norm(1.01 * CONFIG.gradient_norm)), Reason.NORM),
         (gradient(0, epoch=3, values=np.full(SIZE, 3e38, np.float32)), Reason.NORM),
+        (gradient(0, epoch=3, values=spoilt(np.nan)), Reason.NONFINITE),
+        (gradient(0, epoch=3, values=spoilt(-np.inf)), Reason.NONFINITE),
         (gradient(0, epoch=3, frames=CONFIG.batch * CONFIG.rollout_steps + 1), Reason.RANGE),
         (gradient(0, epoch=3, values=Bf16Gradient(np.zeros(SIZE, np.uint16))), Reason.CODEC),
     ],
     ids=[
-        *("last epoch", "next epoch", "future version", "too long", "too short", "too large", "huge"),
-        *("too many frames", "other codec"),
+        *("last epoch", "next epoch", "future version", "too long", "too short", "too large", "huge", "NaN"),
+        *("infinite", "too many frames", "other codec"),
     ],
 )
 def test_a_gradient_that_does_not_fit_is_refused_and_changes_nothing(item: GradientPush, reason: Reason) -> None:
