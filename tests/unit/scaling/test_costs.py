@@ -24,8 +24,8 @@ def test_costs_of_both_presets_are_shipped(preset: str) -> None:
     for one in (shipped, *others):
         assert one.act > 0
         assert "bench train" in one.command
-        assert one.modelled_one == pytest.approx(one.measured_one, rel=0.02)
-        assert one.modelled_two == pytest.approx(one.measured_two, rel=0.02)
+        assert one.modelled_one == pytest.approx(one.measured_one, rel=0.05)
+        assert one.modelled_two == pytest.approx(one.measured_two, rel=0.05)
 
 
 def test_what_does_not_depend_on_the_size_is_what_a_line_through_both_presets_says() -> None:
