@@ -36,10 +36,6 @@ DTYPES: Final[Mapping[str, np.dtype[Any]]] = {
 
 NumPy has no bfloat16: an array of them holds their bits, the upper half of those of the float32.
 """
-_BFLOAT16_EXPONENT: Final = np.uint16(0x7F80)
-"""The bits of a bfloat16's exponent; all of them set say NaN or infinity."""
-_BLOCK: Final = 32 * 1024
-"""Elements that are looked at in one go where a pass needs memory of its own: they stay in the cache."""
 
 
 class Spec(Protocol):
@@ -174,8 +170,9 @@ class Tensor:
         low: Smallest element allowed.
         high: Largest element allowed.
         bulk: Whether the elements stand behind the message's map instead of in it; see `hoz_dist.wire.protocol.bulk`.
-            For `bfloat16` there are neither bounds.
         finite: Whether every element must be finite; False where who receives the array finds that out anyway.
+
+    For ``bfloat16`` nothing is judged of the elements: NumPy has only their bits.
     """
 
     dtype: str
@@ -190,13 +187,13 @@ class Tensor:
     FIELDS: ClassVar[frozenset[str]] = DESCRIPTION | {"data"}
 
     def __post_init__(self) -> None:
-        """Refuse bounds that `check` could not judge.
+        """Refuse what `check` could not judge.
 
         Raises:
-            ValueError: There are some for ``bfloat16``, which NumPy has only as bits.
+            ValueError: Something is wanted of elements that are ``bfloat16``.
         """
-        if self.dtype == "bfloat16" and (self.low, self.high) != (-math.inf, math.inf):
-            message = "a tensor of bfloat16 has no bounds"
+        if self.dtype == "bfloat16" and (self.low, self.high, self.finite) != (-math.inf, math.inf, False):
+            message = "a tensor of bfloat16 has no bounds, and may hold what is not finite"
             raise ValueError(message)
 
     def pack(self, value: NDArray[Any]) -> object:
@@ -246,7 +243,7 @@ class Tensor:
             raise RejectedError(Reason.SHAPE, f"{where} has the shape {value.shape}, not {self.rank} filled axes")
         if value.size > self.most:
             raise RejectedError(Reason.SIZE, f"{where} has {value.size} elements, more than {self.most}")
-        if self.finite and not (_all_finite_halves(value) if self.dtype == "bfloat16" else _all_finite(value)):
+        if self.finite and not _all_finite(value):
             raise RejectedError(Reason.NONFINITE, f"{where} holds NaN or infinity")
         if (self.low > -math.inf and value.min() < self.low) or (self.high < math.inf and value.max() > self.high):
             raise RejectedError(Reason.RANGE, f"{where} has an element that is not in {self.low}..{self.high}")
@@ -367,13 +364,6 @@ def _all_finite(array: NDArray[Any]) -> bool:
     flat = array.reshape(-1)
     with np.errstate(over="ignore", invalid="ignore"):
         return bool(np.isfinite(np.dot(flat, flat))) or bool(np.isfinite(flat).all())
-
-
-def _all_finite_halves(bits: NDArray[np.uint16]) -> bool:
-    """Return whether every bfloat16 is finite."""
-    flat = bits.reshape(-1)
-    blocks = (flat[start : start + _BLOCK] for start in range(0, flat.size, _BLOCK))
-    return all((block & _BFLOAT16_EXPONENT).max() < _BFLOAT16_EXPONENT for block in blocks)
 
 
 def wrong_type(where: str, wanted: str, value: object) -> RejectedError:

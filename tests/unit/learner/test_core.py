@@ -162,6 +162,16 @@ def test_a_compressed_gradient_is_applied_as_what_it_stands_for(codec: Compressi
     assert core.version == 2
 
 
+@pytest.mark.parametrize("bits", [0x7F80, 0xFFC0])
+def test_a_compressed_gradient_that_is_not_finite_is_refused(bits: int) -> None:
+    halves = np.full(SIZE, bits, np.uint16)
+    assert refused(new_core(replace(CONFIG, compress="bf16")), gradient(0, values=Bf16Gradient(halves))).reason == (
+        Reason.NONFINITE
+    )
+    largest = TopKGradient(SIZE, np.array([2], np.uint32), halves[:1])
+    assert refused(new_core(replace(CONFIG, compress="topk")), gradient(0, values=largest)).reason == Reason.NONFINITE
+
+
 def test_a_compressed_gradient_that_is_too_long_is_refused() -> None:
     core = new_core(replace(CONFIG, compress="topk"))
     form = TopKGradient(SIZE, np.array([2], np.uint32), np.array([0x4180], np.uint16))  # 16
