@@ -3,10 +3,11 @@
 import multiprocessing
 import os
 import signal
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
+from pathlib import Path
 from typing import Any, Final, NamedTuple, TypeVar
 
 from hoz_dist.cli.progress import Progress
@@ -111,6 +112,17 @@ class Companion:
     def resume(self) -> None:
         """Let it go on after `pause`."""
         self._signal(signal.SIGCONT)
+
+    def run_on(self, cores: Iterable[int]) -> None:
+        """Let all of its threads run on these cores alone.
+
+        Raises:
+            OSError: The system does not allow it.
+        """
+        if self._process.is_alive():
+            for thread in Path(f"/proc/{self._process.pid}/task").iterdir():
+                with suppress(ProcessLookupError):  # of a thread that has just ended
+                    os.sched_setaffinity(int(thread.name), cores)
 
     def stop(self) -> None:
         """Tell it to stop, and wait until it has.

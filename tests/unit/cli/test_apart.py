@@ -4,11 +4,13 @@ import os
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+from threading import Event, Thread
 
 import pytest
 
 from hoz_dist.cli.apart import companion, work_apart
 from hoz_dist.errors import HozError, NotFoundError
+from tests.waiting import until
 
 
 def add_up(numbers: list[int], progress: Callable[[float, float, str], None]) -> tuple[int, str]:
@@ -64,6 +66,33 @@ def test_a_companion_serves_until_it_is_told_to_stop(tmp_path: Path) -> None:
         assert begun.exists()
         assert not ended.exists()
     assert ended.exists()
+
+
+def note_cores(path: Path, ready: Callable[[], None], stopped: Callable[[float], bool]) -> None:
+    """Note the cores of each of two threads, again and again."""
+    done = Event()
+    thread = Thread(target=done.wait)
+    thread.start()
+    ready()
+    while not stopped(0.01):
+        tasks = [task.name for task in Path("/proc/self/task").iterdir()]
+        cores = [os.sched_getaffinity(int(task)) for task in tasks]
+        path.with_suffix(".new").write_text(repr(cores))
+        path.with_suffix(".new").replace(path)
+    done.set()
+    thread.join()
+
+
+def is_noted(path: Path, what: object) -> bool:
+    return path.exists() and path.read_text() == repr(what)
+
+
+def test_all_threads_of_a_companion_run_where_they_are_told_to(tmp_path: Path) -> None:
+    mine, path = os.sched_getaffinity(0), tmp_path / "cores"
+    with companion(partial(note_cores, path)) as served:
+        for cores in ({max(mine)}, mine):
+            served.run_on(cores)
+            until(partial(is_noted, path, [cores, cores]), "the cores")
 
 
 def test_a_companion_that_fails_says_so_at_the_end() -> None:
