@@ -1,6 +1,6 @@
 """From what runs of one and two actors took to the costs that `hoz-dist simulate` computes with."""
 
-from hoz_dist.bench.report import this_machine
+from hoz_dist.bench.report import Metric, this_machine
 from hoz_dist.bench.training import Measured, Window
 from hoz_dist.config import RunConfig
 from hoz_dist.policy.parameters import initial_parameters
@@ -8,7 +8,9 @@ from hoz_dist.scaling.calibration import fitted
 from hoz_dist.scaling.costs import Costs
 
 
-def measured_costs(config: RunConfig, one: Measured, two: Measured, cores: int, command: str) -> Costs:
+def measured_costs(
+    config: RunConfig, one: Measured, two: Measured, turns: Metric | None, cores: int, command: str
+) -> Costs:
     """Return the costs of an update on this machine.
 
     What the stages of a process do not account for is counted as Zenoh's threads'. Of a run that learns from rollouts
@@ -18,6 +20,8 @@ def measured_costs(config: RunConfig, one: Measured, two: Measured, cores: int, 
         config: Configuration of the runs.
         one: A run with one actor.
         two: A run with two.
+        turns: What `hoz_dist.bench.training.turns_metric` makes of processes that take turns on a core; None if none
+            could be made to.
         cores: Cores of this machine.
         command: What measured them.
     """
@@ -50,6 +54,7 @@ def measured_costs(config: RunConfig, one: Measured, two: Measured, cores: int, 
         serve=learner("serve"),
         record=learner("record", "idle"),
         learner_wire=one.median(lambda window: _rest(window.learner) / window.updates),
+        switching=max(turns.median - 1.0, 0.0) if turns is not None else 0.0,
     )
     return fitted(costs, cores, one.median(_speed), two.median(_speed))
 

@@ -207,6 +207,20 @@ def metrics_of(run: Measured, alone: Measured | None, suffix: str = "") -> dict[
     return {f"{name}{suffix}": metric for name, metric in metrics.items()}
 
 
+def turns_metric(one: Measured, two: Measured) -> Metric:
+    """Return how much processor time a frame takes two processes that take turns on a core, relative to one alone.
+
+    That is the speed of the one divided by that of both together, if nothing else runs on the core; what does changes
+    speeds far more than processor time.
+
+    Args:
+        one: A process that has a core to itself.
+        two: That and another one, on the same core.
+    """
+    pairs = zip(one.windows, two.windows, strict=True)
+    return Metric.of([_cpu_of_a_frame(both) / _cpu_of_a_frame(alone) for alone, both in pairs], "x alone", 1.0)
+
+
 def prediction_metrics(run: Measured, predicted: float, suffix: str) -> dict[str, Metric]:
     """Return how a prediction compares with a run.
 
@@ -233,6 +247,10 @@ def bottleneck(run: Measured) -> str:
         return f"actor {longest}"
     busy = [stage for stage in LEARNER_STAGES if stage != "idle"]
     return f"learner {max(busy, key=lambda stage: run.median(lambda w: w.of_learner(f'{stage}.wall')))}"
+
+
+def _cpu_of_a_frame(window: Window) -> float:
+    return window.actors["cpu"] / window.actors["frames"]
 
 
 def _wall(window: Window, stage: str) -> float:

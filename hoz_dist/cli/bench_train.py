@@ -77,7 +77,7 @@ def train_command(
         raise InvalidValueError(message)
 
     from hoz_dist.atomic import check_writable, write_atomically
-    from hoz_dist.bench.training import bottleneck, measure_in_turns, metrics_of, prediction_metrics
+    from hoz_dist.bench.training import bottleneck, measure_in_turns, metrics_of, prediction_metrics, turns_metric
     from hoz_dist.cli.launch import sharing
     from hoz_dist.cli.progress import Progress
     from hoz_dist.cli.rendering import Encoding, render_rooms
@@ -98,18 +98,20 @@ def train_command(
         runs: dict[str, Trainers] = {
             _name(count): stack.enter_context(_Run(logs / _name(count), count, learner, actor)) for count in counts
         }
-        loops = partial(_in_process, config, rooms, folder, weights, logs)
-        alone = {"in process": stack.enter_context(loops(counts[0]))}
+        most = max(counts[0], 2) if costs is not None else counts[0]
+        loops = stack.enter_context(_in_process(config, rooms, folder, weights, logs, most))
         with Progress("Getting ready", 1.0, None) as progress:
-            for number, (name, trainers) in enumerate((alone | runs).items()):
+            for number, (name, trainers) in enumerate({"in process": loops, **runs}.items()):
                 trainers.resume()
                 for ready in trainers.await_rooms():
                     progress.update((number + ready / len(trainers.files)) / (len(runs) + 1), name)
                 trainers.pause()
             progress.update(1.0)
         with Progress("Measuring", 1.0, None) as progress:
+            core = _core_to_share() if costs is not None else None
+            turns = {f"{count} on a core": loops.first(count, core) for count in (1, 2) if core is not None}
             measured = measure_in_turns(
-                runs | alone,
+                {**runs, "in process": loops.first(counts[0]), **turns},
                 seconds=seconds,
                 repeats=repeats,
                 progress=lambda done, total, note: progress.update(done, note, total=total),
@@ -122,7 +124,14 @@ def train_command(
         from hoz_dist.bench.costs import measured_costs
 
         command = command_line(click.get_current_context())
-        found = measured_costs(config, measured[_name(1)], measured[_name(2)], jobs, command)
+        ratio = turns_metric(*(measured[name] for name in turns)) if turns else None
+        if ratio is None:
+            click.echo(
+                "What taking turns on a core costs was not measured: this system binds no process to one.", err=True
+            )
+        else:
+            metrics["switching_ratio"] = ratio
+        found = measured_costs(config, measured[_name(1)], measured[_name(2)], ratio, jobs, command)
         write_atomically(costs, found.to_text().encode(), overwrite=force)
         for count in counts:
             metrics |= prediction_metrics(measured[_name(count)], _predicted(found, count, jobs), f"_a{count}")
@@ -206,19 +215,34 @@ class _Run(Trainers):
 
 
 class _Loops(Trainers):
-    """Processes that train without Zenoh."""
+    """Processes that train without Zenoh.
 
-    def __init__(self, paths: Sequence[Path], loops: "Sequence[Companion]") -> None:
-        self.files = [TimingsFile(path) for path in paths]
+    Args:
+        files: What each of them writes.
+        loops: The processes.
+        core: The core that all of them share while they train; None for any of those that this process may use.
+    """
+
+    def __init__(self, files: Sequence[TimingsFile], loops: "Sequence[Companion]", core: int | None = None) -> None:
+        self.files = files
         self._loops = loops
+        self._core = core
+
+    def first(self, count: int, core: int | None = None) -> "_Loops":
+        """Return the first ones of them, which may share a core."""
+        return _Loops(self.files[:count], self._loops[:count], core)
 
     def resume(self) -> None:
         for loop in self._loops:
+            if self._core is not None:
+                loop.run_on({self._core})
             loop.resume()
 
     def pause(self) -> None:
         for loop in self._loops:
             loop.pause()
+            if self._core is not None:
+                loop.run_on(os.sched_getaffinity(0))
 
     def check(self) -> None:
         for loop in self._loops:
@@ -237,9 +261,20 @@ def _in_process(
     with ExitStack() as stack:
         work = partial(train_in_process, config, rooms, cache, weights)
         works = (partial(work, path.stem, path) for path in paths)
-        loops = _Loops(paths, [stack.enter_context(companion(partial(_mortal, os.getpid(), work))) for work in works])
+        companions = [stack.enter_context(companion(partial(_mortal, os.getpid(), work))) for work in works]
+        loops = _Loops([TimingsFile(path) for path in paths], companions)
         loops.pause()
         yield loops
+
+
+def _core_to_share() -> int | None:
+    """Return a core to which processes can be bound; None where the system binds none."""
+    cores = os.sched_getaffinity(0)
+    try:
+        os.sched_setaffinity(0, cores)
+    except OSError:
+        return None
+    return max(cores)
 
 
 def _mortal(parent: int, work: Callable[..., None], **told: Any) -> None:

@@ -26,7 +26,7 @@ def fitted(costs: Costs, cores: int, one: float, two: float) -> Costs:
     beside what was measured.
 
     Args:
-        costs: What an update costs, measured on a host of that many cores with one actor.
+        costs: What an update costs, measured on a host of that many cores with one actor; ``switching`` stays as it is.
         cores: Cores of the host.
         one: Frames per second of the run with one actor.
         two: Of that with two.

@@ -79,11 +79,15 @@ class Costs:
     gil: float = 0.2
     """Share of the rest of the time of the learner's Python threads in which they hold the interpreter lock: not
     measured; NumPy and PyTorch give it up for most of what they do."""
+    # --- the host ---
+    switching: float
+    """Share by which all takes longer while more threads than cores of a host have work, so that processes take turns:
+    measured with two of them on one core; 0 if it could not be."""
     # --- fitted to two runs on one host; see `hoz_dist.scaling.calibration` ---
     exchange: float = 0.0
     """Time that a question and its answer take beside all that computes, seconds."""
     crowding: float = 0.0
-    """Share by which all takes longer while all cores of a host work."""
+    """Share by which all takes longer while all cores of a host work, whether or not processes take turns."""
     measured_one: float = 0.0
     """Frames per second of the run with one actor; 0 if nothing was fitted, as the next three."""
     measured_two: float = 0.0

@@ -79,7 +79,7 @@ class _Run:
         self._env = env = simpy.Environment()
         self._counted = Counted()
         self._goal, self._until = env.event(), 0
-        self._host = Shared(env, setting.cores, crowding=costs.crowding)
+        self._host = self._make_host()
         self._actors = self._host if setting.one_host else Shared(env)
         self._latency = 0.0 if setting.one_host else setting.latency
         levels = setting.relays
@@ -158,13 +158,16 @@ class _Run:
         if not self._goal.triggered:
             self._goal.succeed()
 
+    def _make_host(self) -> Shared:
+        costs = self._costs
+        return Shared(self._env, self._setting.cores, crowding=costs.crowding, switching=costs.switching)
+
     def _make_link(self, flow: float) -> Link:
         bandwidth = math.inf if self._setting.one_host else self._setting.hub_bandwidth
         return Link(Way(self._env, bandwidth, flow, self._rng), Way(self._env, bandwidth, flow, self._rng))
 
     def _make_relay(self, above: Node, flow: float, *, clients: int) -> Node:
-        host = Shared(self._env, self._setting.cores, crowding=self._costs.crowding)
-        place = Place(self._env, host, self._make_link(flow), self._latency)
+        place = Place(self._env, self._make_host(), self._make_link(flow), self._latency)
         return Relay(above, place, self._costs, clients=clients, counted=self._counted, rng=self._rng)
 
     def _moment(self) -> _Moment:

@@ -31,6 +31,8 @@ class Shared:
             moment would otherwise be done at the same moment, and stay in step for ever. None for exact shares.
         crowding: Share by which work takes longer while all units are in use, if they are not infinitely many; cores
             share caches and memory.
+        switching: Share by which work takes longer still while there are more users than units, if they are not
+            infinitely many; processes that take turns on a core find its caches cold.
     """
 
     def __init__(
@@ -39,10 +41,12 @@ class Shared:
         units: float = math.inf,
         uneven: random.Random | None = None,
         crowding: float = 0.0,
+        switching: float = 0.0,
     ) -> None:
         self._env = env
         self.units = units
         self._crowding = crowding
+        self._switching = switching
         self._uneven = uneven
         self._users: list[tuple[float, int, simpy.Event]] = []
         """What each one's progress must reach, its number, and what happens then."""
@@ -80,7 +84,10 @@ class Shared:
         """Return how fast each user gets on."""
         users = len(self._users)
         crowd = min(users - 1, self.units - 1) / (self.units - 1) if self.units > 1 else 0.0
-        return min(1.0, self.units / users) / (1.0 + self._crowding * crowd)
+        slower = 1.0 + self._crowding * crowd
+        if users > self.units:
+            slower *= 1.0 + self._switching
+        return min(1.0, self.units / users) / slower
 
     def _get_on(self) -> None:
         """Account for the time since the last change."""

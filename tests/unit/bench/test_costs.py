@@ -3,6 +3,7 @@
 import pytest
 
 from hoz_dist.bench.costs import measured_costs
+from hoz_dist.bench.report import Metric
 from hoz_dist.bench.training import Measured, Window
 from hoz_dist.config import RunConfig
 from hoz_dist.scaling.costs import Costs
@@ -22,7 +23,7 @@ def run_of(seconds: float) -> Measured:
 
 def test_all_that_processors_did_is_some_cost_of_an_update() -> None:
     config = RunConfig(learn_from="rollouts", parameters="delta")
-    found = measured_costs(config, run_of(0.2), run_of(0.1), 2, "hoz-dist bench train")
+    found = measured_costs(config, run_of(0.2), run_of(0.1), None, 2, "hoz-dist bench train")
     assert (found.learn_from, found.parameters_form, found.frames) == ("rollouts", "delta", 100.0)
     assert (found.act, found.push, found.load) == pytest.approx((0.4, 0.03, 0.02))
     assert found.apply == pytest.approx(0.21)  # and the computing of gradients, which a learner of rollouts does
@@ -32,3 +33,12 @@ def test_all_that_processors_did_is_some_cost_of_an_update() -> None:
     assert sum(own) == pytest.approx((sum(ACTOR.values()) + 0.5) / 10)
     assert (found.measured_one, found.measured_two) == pytest.approx((5000, 10_000))
     assert Costs.from_text(found.to_text(), "costs.json") == found
+
+
+@pytest.mark.parametrize(("turns", "switching"), [([1.1, 1.2, 1.5], 0.2), ([0.8, 0.9, 1.1], 0.0), (None, 0.0)])
+def test_turns_cost_what_they_take_longer_and_never_less_than_nothing(
+    turns: list[float] | None, switching: float
+) -> None:
+    ratio = Metric.of(turns, "x alone", 1.0) if turns is not None else None
+    found = measured_costs(RunConfig(), run_of(0.2), run_of(0.1), ratio, 2, "hoz-dist bench train")
+    assert found.switching == pytest.approx(switching)

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from hoz_dist.bench.timings import TimingsFile, between, totals_of
-from hoz_dist.bench.training import Measured, Trainers, Window, bottleneck, metrics_of, prediction_metrics
+from hoz_dist.bench.training import Measured, Trainers, Window, bottleneck, metrics_of, prediction_metrics, turns_metric
 from hoz_dist.errors import HozError
 
 LEARNER = {"receive": 0.2, "apply": 0.3, "idle": 5.0}
@@ -96,6 +96,17 @@ def test_a_prediction_is_compared_with_what_was_measured() -> None:
     predicted, ratio = found["predicted_frames_per_second_a4"], found["prediction_ratio_a4"]
     assert (predicted.median, predicted.limit) == (60.0, None)
     assert (ratio.median, ratio.limit) == (1.2, 1.0)
+
+
+def test_turns_are_told_by_processor_time_of_a_frame_window_by_window() -> None:
+    def process(*windows: tuple[float, float]) -> Measured:
+        return Measured(Still(), [Window(4.0, {"cpu": cpu, "frames": frames}, {}) for cpu, frames in windows])
+
+    # Something else takes half of the core from the first in one window, and slows down both in another.
+    one, two = process((4.0, 400.0), (2.0, 200.0), (4.0, 200.0)), process((4.0, 320.0), (4.0, 320.0), (4.0, 160.0))
+    found = turns_metric(one, two)
+    assert (found.min, found.max) == pytest.approx((1.25, 1.25))
+    assert (found.unit, found.limit) == ("x alone", 1.0)
 
 
 def test_what_goes_on_while_the_actor_acts_is_none_of_its_time() -> None:

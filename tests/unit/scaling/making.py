@@ -13,7 +13,14 @@ NOTHING: dict[str, Any] = dict.fromkeys(
 
 def costs(**values: Any) -> Costs:
     """Costs of 1000 parameters and 100 frames an update; nothing takes time but what is given."""
-    nothing = NOTHING | {"learner_wire": 0.0, "notify": 0.0, "notify_wire": 0.0, "fixed": 0.0, "gil": 0.0}
+    nothing = NOTHING | {
+        "learner_wire": 0.0,
+        "notify": 0.0,
+        "notify_wire": 0.0,
+        "fixed": 0.0,
+        "gil": 0.0,
+        "switching": 0.0,
+    }
     about = {"preset": "compact", "machine": "none", "command": "none"}
     return Costs(**(about | {"parameters": 1000, "frames": 100.0} | nothing | values))
 

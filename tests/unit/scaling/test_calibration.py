@@ -19,11 +19,12 @@ def speed(some: Costs, actors: int) -> float:
 
 def test_exchange_and_crowding_are_found_from_two_runs() -> None:
     # Zenoh's threads work beside the only actor: both numbers tell in both runs.
-    about = {"act": 0.3, "apply": 0.05, "actor_wire": 0.1}
+    about = {"act": 0.3, "apply": 0.05, "actor_wire": 0.1, "switching": 0.2}
     real = costs(**about, exchange=0.01, crowding=0.3)
     found = fitted(costs(**about), CORES, speed(real, 1), speed(real, 2))
     assert found.exchange == pytest.approx(0.01, abs=0.002)
     assert found.crowding == pytest.approx(0.3, abs=0.03)
+    assert found.switching == 0.2
     assert speed(found, 6) == pytest.approx(speed(real, 6), rel=0.02)
     assert (found.measured_one, found.measured_two) == (speed(real, 1), speed(real, 2))
     assert (found.modelled_one, found.modelled_two) == (speed(found, 1), speed(found, 2))

@@ -12,7 +12,7 @@ from tests.unit.scaling.making import costs, setting
 
 
 def test_a_file_gives_back_what_was_written() -> None:
-    some = costs(act=0.5, crowding=0.1, learn_from="rollouts")
+    some = costs(act=0.5, crowding=0.1, switching=0.2, learn_from="rollouts")
     assert Costs.from_text(some.to_text(), "costs.json") == some
 
 
@@ -53,6 +53,7 @@ def test_only_known_presets_have_costs() -> None:
         ({"compress": "zip"}, "Unknown compression 'zip'"),
         ({"more": 1}, "missing or unknown: more"),
         ({"act": None}, "missing or unknown: act"),
+        ({"switching": None}, "missing or unknown: switching"),
     ],
 )
 def test_a_file_that_is_wrong_is_refused_in_one_sentence(change: dict[str, Any], named: str) -> None:

@@ -87,6 +87,13 @@ def test_crowded_cores_are_slower_and_a_core_alone_is_not() -> None:
     assert found.updates_per_second == pytest.approx(2 * 2.0 / 1.25, rel=0.02)
 
 
+@pytest.mark.parametrize(("actors", "slower"), [(1, 1.0), (2, 1.25), (3, 1.25 * 1.2), (8, 1.25 * 1.2)])
+def test_processes_that_take_turns_are_slower_than_those_that_fill_the_cores(actors: int, slower: float) -> None:
+    some = costs(act=0.5, crowding=0.25, switching=0.2)
+    found = simulate(some, setting(actors=actors, one_host=True, cores=2))
+    assert found.updates_per_second == pytest.approx(min(actors, 2) * 2.0 / slower, rel=0.02)
+
+
 def test_a_learner_applies_no_more_than_its_thread_can() -> None:
     found = simulate(costs(act=1.0, apply=0.03, publish=0.02), setting(actors=100))
     assert found.updates_per_second == pytest.approx(1 / 0.05, rel=0.02)

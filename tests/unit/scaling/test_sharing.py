@@ -8,16 +8,17 @@ import simpy
 from hoz_dist.scaling.sharing import Shared
 
 
-def ends(units: float, begins: list[tuple[float, float]], crowding: float = 0.0) -> list[float]:
+def ends(units: float, begins: list[tuple[float, float]], crowding: float = 0.0, switching: float = 0.0) -> list[float]:
     """Return when each user is done.
 
     Args:
         units: Of what is shared.
         begins: When each user comes, and how much work it has.
         crowding: See `Shared`.
+        switching: The same.
     """
     env = simpy.Environment()
-    shared = Shared(env, units, crowding=crowding)
+    shared = Shared(env, units, crowding=crowding, switching=switching)
     done = [0.0] * len(begins)
 
     def user(number: int, begin: float, work: float) -> simpy.events.ProcessGenerator:
@@ -28,7 +29,8 @@ def ends(units: float, begins: list[tuple[float, float]], crowding: float = 0.0)
     for number, (begin, work) in enumerate(begins):
         env.process(user(number, begin, work))
     env.run()
-    assert shared.used() == pytest.approx(sum(work for _, work in begins))
+    if not switching:  # slower work uses units for longer
+        assert shared.used() == pytest.approx(sum(work for _, work in begins))
     return done
 
 
@@ -51,7 +53,14 @@ def test_units_need_not_be_whole() -> None:
 
 
 def test_infinitely_many_units_are_one_for_each() -> None:
-    assert ends(math.inf, [(0, 1), (0, 2)], crowding=0.5) == pytest.approx([1, 2])
+    assert ends(math.inf, [(0, 1), (0, 2)], crowding=0.5, switching=0.5) == pytest.approx([1, 2])
+
+
+def test_who_takes_turns_is_slowed_down_and_nobody_else() -> None:
+    assert ends(2, [(0, 1), (0, 2)], switching=0.5) == pytest.approx([1, 2])
+    # Three on two units: 3 s of turns instead of 2 without them, for 4 s of work; the last one then is alone.
+    assert ends(2, [(0, 4 / 3), (0, 4 / 3), (0, 7 / 3)], switching=0.5) == pytest.approx([3, 3, 4])
+    assert ends(2, [(0, 1)] * 4, crowding=0.2, switching=0.5) == pytest.approx([2 * 1.2 * 1.5] * 4)
 
 
 def test_no_work_takes_no_time() -> None:
