@@ -6,6 +6,7 @@ from typing import Any, Final, Literal, get_args
 from hoz_dist.errors import InvalidValueError, UnknownNameError
 from hoz_dist.graph.checks import MAX_ZONES
 from hoz_dist.graph.planner import DEFAULT_EDGE_COST, EdgeCost
+from hoz_dist.nav.categories import ROOM_SCENES, SCENES
 from hoz_dist.nav.pose import PICTURE_SIZE
 from hoz_dist.policy.settings import EncoderName, Layer, Method, PolicySettings, Precision, Preset
 
@@ -47,6 +48,8 @@ class RunConfig:
     zones: int = 8
     """K, zones of a graph."""
     edge_cost: EdgeCost = DEFAULT_EDGE_COST
+    scenes: int = len(ROOM_SCENES)
+    """S, scenes that the scene layer tells apart, the first ones of `SCENES`; runs in apartments need all of them."""
     seed: int = 0
     batch: int = 64
     """B, episodes that an actor runs at once."""
@@ -110,9 +113,14 @@ class RunConfig:
             self.preset,
             channels=self.channels,
             zones=self.zones,
+            scenes=self.scenes,
             without=self.without,
             precision=self.precision,
         )
+
+    def tells(self, scene: str) -> bool:
+        """Say whether the policy can be trained in a scene: its scene layer, if it has one, needs an output for it."""
+        return not self.policy.scene_layer or scene in SCENES[: self.scenes]
 
     @property
     def most_lag(self) -> int:
@@ -133,7 +141,7 @@ class RunConfig:
 
         Args:
             values: What `to_json` returned, perhaps by way of a file or the network; of an older run, fields that there
-                were not yet have their defaults, which is how it was then.
+                were not yet have the values of `_LATER`, which is how it was then.
 
         Raises:
             InvalidValueError: A field is missing, unknown, of the wrong type or out of range.
@@ -141,7 +149,7 @@ class RunConfig:
         """
         known = {field.name: field for field in fields(cls)}
         if isinstance(values, dict):
-            values = {name: known[name].default for name in _LATER} | values
+            values = _LATER | values
         if not isinstance(values, dict) or set(values) != set(known):
             given = set(values) if isinstance(values, dict) else set()
             wrong = sorted(str(name) for name in given ^ set(known))
@@ -173,12 +181,19 @@ def _fits(name: str, value: object, default: object) -> bool:
     return type(value) is type(default) or (type(default) is float and type(value) is int)
 
 
-_LATER: Final = ("precision", "learn_from", "compress", "parameters")
-"""Fields that the first run folders do not have."""
+_LATER: Final[dict[str, Any]] = {
+    "precision": "fp32",
+    "learn_from": "gradients",
+    "compress": "fp32",
+    "parameters": "full",
+    "scenes": len(ROOM_SCENES),
+}
+"""Fields that the first run folders do not have, and what they were then."""
 _RANGES: Final = (
     ("channels", 1, 4096),
     ("picture_size", 16, 512),
     ("zones", 2, MAX_ZONES),
+    ("scenes", len(ROOM_SCENES), len(SCENES)),
     ("seed", 0, 2**31 - 1),
     ("batch", 1, 4096),
     # After an episode's end comes a step that only resets, so of two steps one is valid.

@@ -130,6 +130,8 @@ class RolloutGradients:
             RejectedError: The rollout is not of the run's shape, or in rooms that cannot be opened.
         """
         self._check_shape(push.steps)
+        if strange := [used.room for used in push.rooms if not self._config.tells(used.room.scene)]:
+            raise RejectedError(Reason.RANGE, f"the run's scene layer has no output for that of {strange[0]}")
         missing = [used.room for used in push.rooms if used.room not in self._rooms]
         for room in missing:
             if room in self._unusable:

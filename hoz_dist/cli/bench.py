@@ -16,7 +16,7 @@ from hoz_dist.cli.bench_options import Measure, benchmark_options, compress_opti
 from hoz_dist.cli.bench_query import query_command
 from hoz_dist.cli.bench_train import train_command
 from hoz_dist.cli.options import cache_option, picture_size_option
-from hoz_dist.nav.categories import SCENES
+from hoz_dist.nav.categories import ROOM_SCENES
 from hoz_dist.nav.pose import PICTURE_SIZE
 from hoz_dist.nav.rooms import RoomId, training_rooms
 
@@ -42,8 +42,8 @@ def bench_group() -> None:
     "--scene",
     "scenes",
     multiple=True,
-    default=SCENES,
-    show_default="all scenes",
+    default=ROOM_SCENES,
+    show_default=", ".join(ROOM_SCENES),
     help="Scene or training room to step in, kitchen or kitchen/3; may be repeated.",
 )
 @click.option(

@@ -20,7 +20,7 @@ from hoz_dist.cli.ports import free_endpoint
 from hoz_dist.cli.processes import Child, Children
 from hoz_dist.cli.run_options import as_arguments, run_config, run_options
 from hoz_dist.errors import HozError, InvalidValueError
-from hoz_dist.nav.categories import SCENES
+from hoz_dist.nav.categories import ROOM_SCENES, scenes_to_tell
 
 if TYPE_CHECKING:
     from hoz_dist.client import HozClient
@@ -45,8 +45,8 @@ if TYPE_CHECKING:
     "--scene",
     "scenes",
     multiple=True,
-    default=SCENES,
-    show_default="all scenes",
+    default=ROOM_SCENES,
+    show_default=", ".join(ROOM_SCENES),
     help="Scene or training room to train in, kitchen or kitchen/3; may be repeated.",
 )
 @click.option(
@@ -109,6 +109,7 @@ def train_command(
     if costs is not None:
         check_writable(costs, overwrite=force)
     rooms = [room for scene in scenes for room in training_rooms((scene,))[:most_rooms]]
+    choices["scenes"] = scenes_to_tell(room.scene for room in rooms)
     config = run_config(choices | {"minutes": None, "frames": None})
     folder = cache or default_cache()
     jobs, counts = len(os.sched_getaffinity(0)), tuple(dict.fromkeys(actors))

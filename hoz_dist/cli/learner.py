@@ -10,6 +10,7 @@ from hoz_dist.cli.options import cache_option, keep_every_option
 from hoz_dist.cli.run_options import run_config, run_options
 from hoz_dist.cli.stopping import stop_on_signals
 from hoz_dist.errors import InvalidValueError
+from hoz_dist.nav.categories import ROOM_SCENES, SCENES
 from hoz_dist.wire.transport.endpoint import DEFAULT_ENCRYPTED_ENDPOINT, DEFAULT_ENDPOINT
 
 if TYPE_CHECKING:
@@ -46,6 +47,13 @@ if TYPE_CHECKING:
     help="Folder of the run; one of the same configuration is resumed. Its last part is the run's name.",
 )
 @run_options
+@click.option(
+    "--scenes",
+    type=click.IntRange(len(ROOM_SCENES), len(SCENES)),
+    default=len(ROOM_SCENES),
+    show_default=True,
+    help=f"How many scenes the scene layer tells apart: {len(ROOM_SCENES)}, or {len(SCENES)} with apartments.",
+)
 @click.option("--minutes", type=float, help="Budget of training time, minutes.  [default: none, until stopped]")
 @click.option("--frames", type=int, help="Budget of environment frames.  [default: none, until stopped]")
 @shared_memory_option

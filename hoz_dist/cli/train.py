@@ -8,7 +8,7 @@ import click
 from hoz_dist.cli.options import cache_option, keep_every_option
 from hoz_dist.cli.ports import free_endpoint
 from hoz_dist.cli.run_options import as_arguments, run_config, run_options
-from hoz_dist.nav.categories import SCENES
+from hoz_dist.nav.categories import ROOM_SCENES, SCENES, scenes_to_tell
 
 
 @click.command("train")
@@ -31,7 +31,8 @@ from hoz_dist.nav.categories import SCENES
     "--scene",
     "scenes",
     multiple=True,
-    help=f"Scene or room to train in: {', '.join(SCENES)}, kitchen/3; may be repeated.  [default: all scenes]",
+    help=f"Scene or room to train in: {', '.join(SCENES)}, kitchen/3; may be repeated.  "
+    f"[default: {', '.join(ROOM_SCENES)}]",
 )
 @click.option(
     "--episodes",
@@ -69,12 +70,13 @@ def train_command(
     from hoz_dist.nav.rooms import training_rooms
 
     # What is wrong with the options is said before anything starts.
-    training_rooms(scenes or SCENES)
+    scenes = scenes or ROOM_SCENES
+    choices["scenes"] = scenes_to_tell(room.scene for room in training_rooms(scenes))
     choices |= {"minutes": 10.0 if minutes is None and frames is None else minutes, "frames": frames}
     config = run_config(choices)
     files = {"weights": choices["weights"], "cache": cache}
     shared = sharing(config.preset, wanted=shared_memory)
-    actor = as_arguments({"scene": scenes or SCENES, **files}) + shared
+    actor = as_arguments({"scene": scenes, **files}) + shared
     learner = as_arguments(choices | {"keep_every": keep_every, "cache": cache}) + shared
 
     launch(run, free_endpoint(), learner, actor, actors)

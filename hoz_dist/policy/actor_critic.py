@@ -12,7 +12,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from hoz_dist.nav.actions import NO_ACTION, Action
-from hoz_dist.nav.categories import SCENES, TARGETS
+from hoz_dist.nav.categories import TARGETS
 from hoz_dist.nav.observation import Observation
 from hoz_dist.policy.graph_bank import GraphBank
 from hoz_dist.policy.layers import DoneReminder, ObjectLayer, SceneLayer, ZoneLayer
@@ -103,13 +103,13 @@ class ActorCritic(nn.Module):
         self.settings = settings
         sizes, categories = settings.sizes, len(TARGETS)
         context = sizes.target + sizes.action
-        context += sizes.zones * settings.zone_layer + len(SCENES) * settings.scene_layer
+        context += sizes.zones * settings.zone_layer + settings.scenes * settings.scene_layer
         self.target_embedding = nn.Linear(categories, sizes.target)
         self.action_embedding = nn.Embedding(NO_ACTION + 1, sizes.action)
         self.trunk = make_trunk(settings, context)
         self.object_layer = ObjectLayer(categories, sizes.objects) if settings.object_layer else None
         self.scene_layer = (
-            SceneLayer(self.trunk.picture_features, categories, len(SCENES)) if settings.scene_layer else None
+            SceneLayer(self.trunk.picture_features, categories, settings.scenes) if settings.scene_layer else None
         )
         self.zone_layer = ZoneLayer(categories, sizes.zones) if settings.zone_layer else None
         self.lstm = EpisodicLSTM(self.trunk.features, sizes.lstm, sizes.lstm_layers)

@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from typing import Final, Literal
 
+from hoz_dist.nav.categories import ROOM_SCENES
+
 Method = Literal["a3c", "object", "hoz"]
 Preset = Literal["compact", "paper"]
 EncoderName = Literal["pooled", "resnet18"]
@@ -64,6 +66,8 @@ class PolicySettings:
     done_reminder: bool = True
     zones: int = 8
     """K of the scene graphs."""
+    scenes: int = len(ROOM_SCENES)
+    """S, outputs of the scene layer."""
     precision: Precision = "fp32"
     """Of the LSTM's products over rollouts; has no part in the parameters."""
 
@@ -75,6 +79,7 @@ class PolicySettings:
         *,
         channels: int,
         zones: int,
+        scenes: int = len(ROOM_SCENES),
         without: tuple[Layer, ...] = (),
         precision: Precision = "fp32",
     ) -> "PolicySettings":
@@ -84,6 +89,7 @@ class PolicySettings:
             sizes=PRESETS[preset],
             channels=channels,
             zones=zones,
+            scenes=scenes,
             object_layer="object" in layers,
             scene_layer="scene" in layers,
             zone_layer="zone" in layers,

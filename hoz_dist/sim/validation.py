@@ -118,7 +118,7 @@ def accept(room: RoomId) -> Entry:
 
 def main() -> None:
     """Remake the catalogue."""
-    rooms = [RoomId(scene, number) for scene in SCENES for numbers in SPLITS.values() for number in numbers]
+    rooms = [RoomId(scene, number) for scene in SCENES for numbers in SPLITS[scene].values() for number in numbers]
     with ProcessPoolExecutor() as pool:
         entries = pool.map(accept, rooms)
         content = {str(room): entry._asdict() for room, entry in zip(rooms, entries, strict=True)}
