@@ -8,7 +8,8 @@ from hoz_dist.graph.checks import MAX_ZONES
 from hoz_dist.graph.planner import DEFAULT_EDGE_COST, EdgeCost
 from hoz_dist.nav.categories import ROOM_SCENES, SCENES
 from hoz_dist.nav.pose import PICTURE_SIZE
-from hoz_dist.policy.settings import EncoderName, Layer, Method, PolicySettings, Precision, Preset
+from hoz_dist.policy.methods.description import Layer, Method
+from hoz_dist.policy.settings import EncoderName, PolicySettings, Precision, Preset
 
 Compression = Literal["fp32", "bf16", "int8", "topk"]
 """How gradients travel: in full, as halves, as bytes, or their largest entries alone."""
@@ -71,6 +72,8 @@ class RunConfig:
     """How gradients travel."""
     parameters: ParametersForm = "full"
     """How parameters travel."""
+    imitation_weight: float = 1.0
+    """Weight of the cross-entropy with the expert's actions, of methods that imitate; without effect on others."""
     max_lag: int = 32
     """Largest policy lag, versions, at which a gradient is applied; see `most_lag` for rollouts."""
     minutes: float | None = None
@@ -209,4 +212,6 @@ _RANGES: Final = (
     ("minutes", 0.01, 1e6),
     ("frames", 1, 10**15),
 )
+    "imitation_weight": 1.0,
 """Field, least value, largest value."""
+    ("imitation_weight", 0.0, 10.0),

@@ -28,12 +28,13 @@ class Ended(NamedTuple):
     def after(cls, push: Push, state: State, known: Tensor) -> Self:
         """Return what a rollout ended with, in memory of its own."""
         zone = ZoneState(*(part.clone() for part in state.zone))
-        return cls(push.incarnation, push.sequence, State(state.lstm.clone(), zone), known.clone())
+        memory = tuple(part.clone() for part in state.memory)
+        return cls(push.incarnation, push.sequence, State(state.lstm.clone(), zone, memory), known.clone())
 
     @property
     def size(self) -> int:
         """Bytes that it takes."""
-        tensors = (self.state.lstm, *self.state.zone, self.known)
+        tensors = (self.state.lstm, *self.state.zone, *self.state.memory, self.known)
         return sum(tensor.numel() * tensor.element_size() for tensor in tensors)
 
 

@@ -4,15 +4,14 @@ from dataclasses import dataclass
 from typing import Final, Literal
 
 from hoz_dist.nav.categories import ROOM_SCENES
+from hoz_dist.policy.methods import METHODS
+from hoz_dist.policy.methods.description import Layer, Method
 
-Method = Literal["a3c", "object", "hoz"]
 Preset = Literal["compact", "paper"]
 EncoderName = Literal["pooled", "resnet18"]
 Precision = Literal["fp32", "bf16"]
 """Of the products over rollouts, most of the arithmetic: their factors and results, and the maps of the trunk.
 Parameters, cells, activations of the LSTM, heads and loss are always fp32; sums within a product are, too."""
-Layer = Literal["object", "scene", "zone", "done"]
-"""Layers that can be switched off: object, scene and zone layer, done reminder."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,14 +42,6 @@ PRESETS: Final[dict[Preset, Sizes]] = {
 }
 
 
-METHOD_LAYERS: Final[dict[Method, tuple[Layer, ...]]] = {
-    "a3c": (),
-    "object": ("object",),
-    "hoz": ("object", "scene", "zone", "done"),
-}
-"""The layers of each method, besides picture, target indicator and previous action."""
-
-
 @dataclass(frozen=True, kw_only=True)
 class PolicySettings:
     """Everything that shapes the network; two networks of equal settings have equal parameter vectors."""
@@ -60,10 +51,8 @@ class PolicySettings:
     """C of the visual encoder."""
     grid: int = 7
     """G of the visual encoder."""
-    object_layer: bool = True
-    scene_layer: bool = True
-    zone_layer: bool = True
-    done_reminder: bool = True
+    layers: tuple[Layer, ...] = METHODS["hoz"].layers
+    """What is added to the network that all methods share."""
     zones: int = 8
     """K of the scene graphs."""
     scenes: int = len(ROOM_SCENES)
@@ -84,15 +73,26 @@ class PolicySettings:
         precision: Precision = "fp32",
     ) -> "PolicySettings":
         """Return the settings of a method, less some of its layers."""
-        layers = set(METHOD_LAYERS[method]) - set(without)
         return cls(
             sizes=PRESETS[preset],
             channels=channels,
             zones=zones,
             scenes=scenes,
-            object_layer="object" in layers,
-            scene_layer="scene" in layers,
-            zone_layer="zone" in layers,
-            done_reminder="done" in layers,
+            layers=tuple(layer for layer in METHODS[method].layers if layer not in without),
             precision=precision,
         )
+
+    @property
+    def scene_layer(self) -> bool:
+        """Whether the network guesses the scene."""
+        return "scene" in self.layers
+
+    @property
+    def zone_layer(self) -> bool:
+        """Whether scene graphs guide the agent."""
+        return "zone" in self.layers
+
+    @property
+    def done_reminder(self) -> bool:
+        """Whether the target's confidence scales Done's logit."""
+        return "done" in self.layers

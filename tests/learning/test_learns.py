@@ -10,8 +10,8 @@ from hoz_dist.graph.room_graph import explore_room
 from hoz_dist.graph.scene_graph import merge_rooms
 from hoz_dist.nav.categories import TARGETS
 from hoz_dist.nav.rooms import RoomId
+from hoz_dist.policy.methods.description import Method
 from hoz_dist.policy.parameters import initial_parameters
-from hoz_dist.policy.settings import Method
 from hoz_dist.sim.batch_env import BatchEnv
 from hoz_dist.sim.pose_graph import PoseGraph
 from hoz_dist.sim.room_views import RoomViews

@@ -9,8 +9,8 @@ import pytest
 from hoz_dist.config import RunConfig
 from hoz_dist.gradient_forms import Vector
 from hoz_dist.nav.observation import Observation
+from hoz_dist.policy.methods.description import Method
 from hoz_dist.policy.parameters import initial_parameters
-from hoz_dist.policy.settings import Method
 from hoz_dist.wire.protocol.codec import decode, encode
 from hoz_dist.wire.protocol.rejection import Reason, RejectedError
 from hoz_dist.wire.protocol.trajectories import Flag, GraphUsed, RoomUsed, TrajectoryPush

@@ -8,9 +8,11 @@ from hoz_dist.config import RunConfig
 from hoz_dist.nav.observation import Observation
 from hoz_dist.policy.actor_critic import ActorCritic, Decision, State
 from hoz_dist.policy.graph_bank import GraphBank
+from hoz_dist.policy.methods import METHODS
+from hoz_dist.policy.methods.description import Layer, Method
 from hoz_dist.policy.navigator import Guidance
 from hoz_dist.policy.parameters import FlatParameters, initial_parameters, make_policy
-from hoz_dist.policy.settings import Layer, Method, Precision, Preset
+from hoz_dist.policy.settings import Precision, Preset
 from hoz_dist.policy.tape import dtype_of
 from tests.unit.policy.making import make_observation, make_scene_graph, step_of
 
@@ -33,7 +35,7 @@ def act_over(policy: ActorCritic, observation: Observation, state: State, bank: 
     return decisions
 
 
-LAYERS = get_args(Layer)
+LAYERS = METHODS["hoz"].layers
 
 
 @pytest.mark.parametrize("preset", ["compact", "paper"])
