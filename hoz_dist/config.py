@@ -5,7 +5,9 @@ from typing import Any, Final, Literal, get_args
 
 from hoz_dist.errors import InvalidValueError, UnknownNameError
 from hoz_dist.graph.checks import MAX_ZONES
-from hoz_dist.graph.planner import DEFAULT_EDGE_COST, EdgeCost
+from hoz_dist.graph.merging import GraphSource, Merging
+from hoz_dist.graph.planner import DEFAULT_EDGE_COST, EdgeCost, Subgoal
+from hoz_dist.graph.zones import Clustering
 from hoz_dist.nav.categories import ROOM_SCENES, SCENES
 from hoz_dist.nav.pose import PICTURE_SIZE
 from hoz_dist.policy.methods.description import Layer, Method
@@ -49,6 +51,14 @@ class RunConfig:
     zones: int = 8
     """K, zones of a graph."""
     edge_cost: EdgeCost = DEFAULT_EDGE_COST
+    subgoal: Subgoal = "path"
+    """Which zone the policy is guided to."""
+    clustering: Clustering = "kmeans"
+    """How views become zones."""
+    merge_order: int | None = None
+    """Seed of the order in which rooms are merged; None for ascending numbers."""
+    graph_source: GraphSource = "rooms"
+    """Where scene graphs have their nodes and edges from."""
     scenes: int = len(ROOM_SCENES)
     """S, scenes that the scene layer tells apart, the first ones of `SCENES`; runs in apartments need all of them."""
     seed: int = 0
@@ -62,6 +72,8 @@ class RunConfig:
     value_weight: float = 0.5
     scene_weight: float = 0.1
     """Weight of the scene layer's cross-entropy."""
+    imitation_weight: float = 1.0
+    """Weight of the cross-entropy with the expert's actions, of methods that imitate; without effect on others."""
     learning_rate: float = 1e-3
     """Adam's learning rate at the start; falls linearly to 0 over the budget, if there is one."""
     gradient_norm: float = 1.0
@@ -72,8 +84,6 @@ class RunConfig:
     """How gradients travel."""
     parameters: ParametersForm = "full"
     """How parameters travel."""
-    imitation_weight: float = 1.0
-    """Weight of the cross-entropy with the expert's actions, of methods that imitate; without effect on others."""
     max_lag: int = 32
     """Largest policy lag, versions, at which a gradient is applied; see `most_lag` for rollouts."""
     minutes: float | None = None
@@ -89,6 +99,9 @@ class RunConfig:
             ("precision", self.precision, get_args(Precision)),
             ("encoder", self.encoder, get_args(EncoderName)),
             ("edge cost", self.edge_cost, get_args(EdgeCost)),
+            ("sub-goal", self.subgoal, get_args(Subgoal)),
+            ("clustering", self.clustering, get_args(Clustering)),
+            ("source of graphs", self.graph_source, get_args(GraphSource)),
             ("source to learn from", self.learn_from, get_args(Source)),
             ("compression", self.compress, get_args(Compression)),
             ("form of parameters", self.parameters, get_args(ParametersForm)),
@@ -124,6 +137,11 @@ class RunConfig:
     def tells(self, scene: str) -> bool:
         """Say whether the policy can be trained in a scene: its scene layer, if it has one, needs an output for it."""
         return not self.policy.scene_layer or scene in SCENES[: self.scenes]
+
+    @property
+    def merging(self) -> Merging:
+        """How room graphs become scene graphs."""
+        return Merging(self.merge_order, self.graph_source, self.seed)
 
     @property
     def most_lag(self) -> int:
@@ -177,7 +195,7 @@ def _fits(name: str, value: object, default: object) -> bool:
     match name:
         case "minutes":
             return value is None or type(value) in {int, float}
-        case "frames":
+        case "frames" | "merge_order":
             return value is None or type(value) is int
         case "without":
             return isinstance(value, list) and all(type(layer) is str for layer in value)
@@ -189,7 +207,12 @@ _LATER: Final[dict[str, Any]] = {
     "learn_from": "gradients",
     "compress": "fp32",
     "parameters": "full",
+    "subgoal": "path",
+    "clustering": "kmeans",
+    "merge_order": None,
+    "graph_source": "rooms",
     "scenes": len(ROOM_SCENES),
+    "imitation_weight": 1.0,
 }
 """Fields that the first run folders do not have, and what they were then."""
 _RANGES: Final = (
@@ -197,6 +220,7 @@ _RANGES: Final = (
     ("picture_size", 16, 512),
     ("zones", 2, MAX_ZONES),
     ("scenes", len(ROOM_SCENES), len(SCENES)),
+    ("merge_order", 0, 2**31 - 1),
     ("seed", 0, 2**31 - 1),
     ("batch", 1, 4096),
     # After an episode's end comes a step that only resets, so of two steps one is valid.
@@ -206,12 +230,11 @@ _RANGES: Final = (
     ("entropy_weight", 0.0, 10.0),
     ("value_weight", 0.0, 10.0),
     ("scene_weight", 0.0, 10.0),
+    ("imitation_weight", 0.0, 10.0),
     ("learning_rate", 1e-8, 1.0),
     ("gradient_norm", 1e-3, 1e6),
     ("max_lag", 0, 100_000),
     ("minutes", 0.01, 1e6),
     ("frames", 1, 10**15),
 )
-    "imitation_weight": 1.0,
 """Field, least value, largest value."""
-    ("imitation_weight", 0.0, 10.0),

@@ -238,7 +238,7 @@ class RolloutGradients:
         key = tuple((graph.scene, graph.version) for graph in graphs)
         if key not in self._banks:
             by_scene = {graph.scene: graph for graph in graphs}
-            self._banks[key] = GraphBank.of(by_scene, self._config.zones, self._config.edge_cost)
+            self._banks[key] = GraphBank.of(by_scene, self._config.zones, self._config.edge_cost, self._config.subgoal)
             if len(self._banks) > _BANKS:
                 self._banks.popitem(last=False)
         self._banks.move_to_end(key)

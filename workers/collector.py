@@ -75,7 +75,7 @@ class Collector:
         self.parameters = FlatParameters(self._policy)
         self._differentiator = Differentiator(config, self._policy, self.parameters)
         self._tape = self._policy.tape(config.rollout_steps, config.batch)
-        self._bank = GraphBank(config.zones, config.edge_cost)
+        self._bank = GraphBank(config.zones, config.edge_cost, config.subgoal)
         self._state: State = self._policy.initial_state(config.batch)
         self._expert = ExpertTable() if self._policy.imitates else None
 

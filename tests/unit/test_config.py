@@ -44,7 +44,16 @@ def test_what_is_no_configuration_is_refused(values: object) -> None:
 
 def test_a_run_from_before_there_was_a_choice_is_what_was_done_then() -> None:
     values = RunConfig(preset="paper", seed=3).to_json()
-    for later in ("precision", "learn_from", "compress", "parameters"):
+    for later in (
+        "precision",
+        "learn_from",
+        "compress",
+        "parameters",
+        "subgoal",
+        "clustering",
+        "merge_order",
+        "graph_source",
+    ):
         del values[later]
     assert RunConfig.from_json(values) == RunConfig(preset="paper", seed=3)
     del values["method"]
