@@ -10,7 +10,9 @@ from hoz_dist.graph.planner import DEFAULT_EDGE_COST, EdgeCost, Subgoal
 from hoz_dist.graph.zones import Clustering
 from hoz_dist.nav.categories import ROOM_SCENES, SCENES
 from hoz_dist.nav.pose import PICTURE_SIZE
+from hoz_dist.policy.methods import METHODS
 from hoz_dist.policy.methods.description import Layer, Method
+from hoz_dist.policy.relations import check_relations, shipped_relations
 from hoz_dist.policy.settings import EncoderName, PolicySettings, Precision, Preset
 
 Compression = Literal["fp32", "bf16", "int8", "topk"]
@@ -38,6 +40,9 @@ class RunConfig:
     method: Method = "hoz"
     without: tuple[Layer, ...] = ()
     """Layers of the method that are switched off."""
+    relations: tuple[str, ...] = ()
+    """Related categories, such as ``Bowl+Plate``: the graph of method `sp`, whose default are those of the training
+    rooms; no other method has any."""
     preset: Preset = "compact"
     precision: Precision = "fp32"
     """Of the LSTM's products over rollouts; on processors without products of bf16 they are of fp32."""
@@ -120,6 +125,12 @@ class RunConfig:
         if self.learn_from == "rollouts" and self.compress != "fp32":
             message = f"Rollouts are no gradients: leave out '{self.compress}' compression, or learn from gradients."
             raise InvalidValueError(message)
+        if "sp" in METHODS[self.method].layers and not self.relations:
+            object.__setattr__(self, "relations", shipped_relations())
+        if "sp" not in METHODS[self.method].layers and self.relations:
+            message = f"Method {self.method} has no graph of related categories; give relations to 'sp' alone."
+            raise InvalidValueError(message)
+        check_relations(self.relations)
 
     @property
     def policy(self) -> PolicySettings:
@@ -131,6 +142,7 @@ class RunConfig:
             zones=self.zones,
             scenes=self.scenes,
             without=self.without,
+            relations=self.relations,
             precision=self.precision,
         )
 
@@ -154,7 +166,15 @@ class RunConfig:
 
     def to_json(self) -> dict[str, Any]:
         """Return the configuration as JSON values."""
-        return asdict(self) | {"without": list(self.without)}
+        return asdict(self) | {"without": list(self.without), "relations": list(self.relations)}
+
+    def distinguishing(self) -> dict[str, Any]:
+        """Return the fields that tell this run from others, as JSON values.
+
+        Fields that came later are left out where they say what was done before, so that a digest of this stays the same
+        when a field is added.
+        """
+        return {name: value for name, value in self.to_json().items() if name not in _LATER or value != _LATER[name]}
 
     @classmethod
     def from_json(cls, values: object) -> "RunConfig":
@@ -182,7 +202,7 @@ class RunConfig:
             if not _fits(name, value, known[name].default):
                 message = f"'{name}' of the configuration is {value!r}, which is of the wrong type."
                 raise InvalidValueError(message)
-        return cls(**(values | {"without": tuple(values["without"])}))
+        return cls(**(values | {name: tuple(values[name]) for name in ("without", "relations")}))
 
     def differences(self, other: "RunConfig") -> list[str]:
         """Name the fields in which two configurations differ, each as ``name: mine, other's``."""
@@ -197,8 +217,8 @@ def _fits(name: str, value: object, default: object) -> bool:
             return value is None or type(value) in {int, float}
         case "frames" | "merge_order":
             return value is None or type(value) is int
-        case "without":
-            return isinstance(value, list) and all(type(layer) is str for layer in value)
+        case "without" | "relations":
+            return isinstance(value, list) and all(type(name) is str for name in value)
     return type(value) is type(default) or (type(default) is float and type(value) is int)
 
 
@@ -213,6 +233,7 @@ _LATER: Final[dict[str, Any]] = {
     "graph_source": "rooms",
     "scenes": len(ROOM_SCENES),
     "imitation_weight": 1.0,
+    "relations": [],
 }
 """Fields that the first run folders do not have, and what they were then."""
 _RANGES: Final = (

@@ -22,6 +22,8 @@ from torch import nn
 
 from hoz_dist.nav.categories import TARGETS
 from hoz_dist.policy.layers import ObjectLayer
+from hoz_dist.policy.layers_org import RelationLayer
+from hoz_dist.policy.layers_sp import PriorLayer
 from hoz_dist.policy.methods.description import Layer
 from hoz_dist.policy.settings import PolicySettings
 
@@ -44,5 +46,7 @@ def _object_layer(settings: PolicySettings) -> nn.Module:
 
 BRANCHES: Final[Mapping[Layer, Branch]] = {
     "object": Branch(_object_shape, _object_layer),
+    "sp": Branch(PriorLayer.shape, PriorLayer),
+    "org": Branch(RelationLayer.shape, RelationLayer),
 }
 """The object branches, by layer."""

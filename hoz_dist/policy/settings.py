@@ -28,6 +28,14 @@ class Sizes:
     """Features of the previous action."""
     objects: int
     """D_o, columns of W_o in Eq. 6."""
+    prior_nodes: int
+    """Features of a node of the graph of `sp`."""
+    prior: int
+    """Output of the graph of `sp`."""
+    relation_hidden: int
+    """Hidden units for each category in `org`."""
+    relation: int
+    """Outputs for each category in `org`."""
     zones: int
     """D_z, columns of W_z in Eq. 5."""
     lstm: int
@@ -36,9 +44,34 @@ class Sizes:
 
 
 PRESETS: Final[dict[Preset, Sizes]] = {
-    "compact": Sizes(trunk="vector", picture=64, target=16, action=8, objects=16, zones=32, lstm=128, lstm_layers=1),
-    # 49 object features: H_o' f^v then has one row per cell of the 7 x 7 grid, as in the released code.
-    "paper": Sizes(trunk="grid", picture=64, target=10, action=10, objects=49, zones=10, lstm=512, lstm_layers=2),
+    "compact": Sizes(
+        trunk="vector",
+        picture=64,
+        target=16,
+        action=8,
+        objects=16,
+        prior_nodes=32,
+        prior=32,
+        relation_hidden=16,
+        relation=4,
+        zones=32,
+        lstm=128,
+        lstm_layers=1,
+    ),
+    "paper": Sizes(
+        trunk="grid",
+        picture=64,
+        target=10,
+        action=10,
+        objects=49,  # H_o' f^v then has one row per cell of the 7 x 7 grid, as in the released code
+        prior_nodes=256,  # SAVN's re-implementation has 1024, which would cost more than all the rest of the network
+        prior=512,
+        relation_hidden=128,
+        relation=49,
+        zones=10,
+        lstm=512,
+        lstm_layers=2,
+    ),
 }
 
 
@@ -53,6 +86,8 @@ class PolicySettings:
     """G of the visual encoder."""
     layers: tuple[Layer, ...] = METHODS["hoz"].layers
     """What is added to the network that all methods share."""
+    relations: tuple[str, ...] = ()
+    """Related categories, such as ``Bowl+Plate``: the graph of `sp`."""
     zones: int = 8
     """K of the scene graphs."""
     scenes: int = len(ROOM_SCENES)
@@ -70,6 +105,7 @@ class PolicySettings:
         zones: int,
         scenes: int = len(ROOM_SCENES),
         without: tuple[Layer, ...] = (),
+        relations: tuple[str, ...] = (),
         precision: Precision = "fp32",
     ) -> "PolicySettings":
         """Return the settings of a method, less some of its layers."""
@@ -79,6 +115,7 @@ class PolicySettings:
             zones=zones,
             scenes=scenes,
             layers=tuple(layer for layer in METHODS[method].layers if layer not in without),
+            relations=relations,
             precision=precision,
         )
 

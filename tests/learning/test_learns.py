@@ -10,6 +10,7 @@ from hoz_dist.graph.room_graph import explore_room
 from hoz_dist.graph.scene_graph import merge_rooms
 from hoz_dist.nav.categories import TARGETS
 from hoz_dist.nav.rooms import RoomId
+from hoz_dist.policy.methods import METHODS
 from hoz_dist.policy.methods.description import Method
 from hoz_dist.policy.parameters import initial_parameters
 from hoz_dist.sim.batch_env import BatchEnv
@@ -20,7 +21,7 @@ from tests.unit.sim.making import open_grid
 from workers.collector import Collector
 
 TARGET = TARGETS.index("Fridge")
-UPDATES = 120
+UPDATES = 80
 
 
 def looking_at_fridge(graph: PoseGraph) -> NDArray[np.bool_]:
@@ -81,7 +82,7 @@ def train(config: RunConfig, updates: int) -> tuple[float, NDArray[np.float32]]:
     return float(np.mean(ended[-200:])), optimizer.parameters.copy()
 
 
-@pytest.mark.parametrize("method", ["a3c", "object", "hoz"])
+@pytest.mark.parametrize("method", METHODS)
 def test_a_tiny_room_is_learnt(method: Method) -> None:
     success, _ = train(RunConfig(method=method, batch=16, learning_rate=3e-3), UPDATES)
     assert success > 0.9

@@ -15,6 +15,8 @@ from hoz_dist.policy.methods.a3c import A3C
 from hoz_dist.policy.methods.description import Description, Method
 from hoz_dist.policy.methods.hoz import HOZ
 from hoz_dist.policy.methods.object import OBJECT
+from hoz_dist.policy.methods.org import ORG
+from hoz_dist.policy.methods.sp import SP
 
-METHODS: Final[dict[Method, Description]] = {one.name: one for one in (A3C, OBJECT, HOZ)}
+METHODS: Final[dict[Method, Description]] = {one.name: one for one in (A3C, OBJECT, SP, ORG, HOZ)}
 """Every method, the simplest first."""

@@ -3,13 +3,14 @@
 from dataclasses import dataclass
 from typing import Literal
 
-Method = Literal["a3c", "object", "hoz"]
+Method = Literal["a3c", "object", "sp", "org", "hoz"]
 """The trained methods."""
-Layer = Literal["object", "scene", "zone", "done"]
+Layer = Literal["object", "sp", "org", "scene", "zone", "done"]
 """The layers that a method adds to the network that all share; each can be switched off.
 
-Object branches, of which a network has at most one (`hoz_dist.policy.branches`): ``object``. Steerings, likewise
-(`hoz_dist.policy.steering`): none yet. Besides, ``scene`` and ``zone`` layer, and ``done``, the done reminder.
+Object branches, of which a network has at most one (`hoz_dist.policy.branches`): ``object``, ``sp``, ``org``.
+Steerings, likewise (`hoz_dist.policy.steering`): none yet. Besides, ``scene`` and ``zone`` layer, and ``done``, the
+done reminder.
 """
 
 
