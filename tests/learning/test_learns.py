@@ -17,6 +17,7 @@ from hoz_dist.sim.batch_env import BatchEnv
 from hoz_dist.sim.pose_graph import PoseGraph
 from hoz_dist.sim.room_views import RoomViews
 from learner.optimizer import FlatAdam
+from tests.unit.policy.steering import ImitatingSteering, steer_a3c
 from tests.unit.sim.making import open_grid
 from workers.collector import Collector
 
@@ -86,6 +87,14 @@ def train(config: RunConfig, updates: int) -> tuple[float, NDArray[np.float32]]:
 def test_a_tiny_room_is_learnt(method: Method) -> None:
     success, _ = train(RunConfig(method=method, batch=16, learning_rate=3e-3), UPDATES)
     assert success > 0.9
+
+
+def test_what_imitates_learns_the_experts_actions(monkeypatch: pytest.MonkeyPatch) -> None:
+    """From the labels alone: neither rewards nor entropy have a part in it."""
+    steer_a3c(monkeypatch, ImitatingSteering)
+    monkeypatch.setattr("hoz_dist.a3c.loss.ADVANTAGE_FLOOR", 1e9)
+    config = RunConfig(method="a3c", batch=16, learning_rate=3e-3, entropy_weight=0.0, value_weight=0.0)
+    assert train(config, 40)[0] > 0.8
 
 
 def test_one_seed_gives_identical_parameters_twice() -> None:
