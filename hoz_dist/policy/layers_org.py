@@ -17,9 +17,9 @@ class RelationLayer(nn.Module):
     has D_o free columns; F_hat thus has a row for each category, which is joined by the category's own box, confidence
     and target indicator again, and two linear layers make a map of each row, the same for all categories.
 
-    Deviations: the released code relates the categories four times, with a ReLU and a bias each, the paper once, as
-    here. Half of the units of the first linear layer start as gates that pass the target's row and shut off others, as
-    half of W_o's columns do in our object layer, so that neither has a better start.
+    Deviations: the released code relates the categories four times, with a ReLU and a bias each; here it is done once,
+    as in Eq. 6 of HOZ. Half of the units of the first linear layer start as gates that pass the target's row and shut
+    off others, as half of W_o's columns do in our object layer, so that neither has a better start.
 
     Args:
         settings: What shapes the network.
