@@ -109,7 +109,8 @@ def actor_command(
             link = stack.enter_context(LearnerLink(session, actor, run, stop, book, memory, clock))
             if strange := [room for room in rooms if not link.config.tells(room.scene)]:
                 message = (
-                    f"The scene layer of run {link.run} has no output for {strange[0].scene}: start another run for it."
+                    f"The scene layer of run {link.run} has no output for {strange[0].scene}: join a run whose learner "
+                    f"was started with --scenes {len(SCENES)}."
                 )
                 raise InvalidValueError(message)
             size = link.config.picture_size
