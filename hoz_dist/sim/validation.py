@@ -45,6 +45,7 @@ ALWAYS_HELD: Final[dict[str, frozenset[str]]] = {
     "bathroom": frozenset({"LightSwitch", "GarbageCan", "Sink"}),
     "apartment": frozenset({"Chair", "GarbageCan", "Fridge", "Sink", "StoveBurner", "Sofa", "Bed"}),
 }
+"""What every room must have, targets or not."""
 LEAST_SHARE_HELD: Final = 0.7
 """Share of the scene's targets that a room must hold."""
 _MOST_ATTEMPTS: Final = 200
