@@ -42,7 +42,7 @@ class RunConfig:
     """Layers of the method that are switched off."""
     relations: tuple[str, ...] = ()
     """Related categories, such as ``Bowl+Plate``: the graph of method `sp`, whose default are those of the training
-    rooms; no other method has any."""
+    rooms; no other method has any, so who makes another method's configuration of one of `sp` empties them."""
     preset: Preset = "compact"
     precision: Precision = "fp32"
     """Of the LSTM's products over rollouts; on processors without products of bf16 they are of fp32."""
@@ -128,7 +128,7 @@ class RunConfig:
         if "sp" in METHODS[self.method].layers and not self.relations:
             object.__setattr__(self, "relations", shipped_relations())
         if "sp" not in METHODS[self.method].layers and self.relations:
-            message = f"Method {self.method} has no graph of related categories; give relations to 'sp' alone."
+            message = f"Method {self.method} has no graph of related categories: leave 'relations' empty, or take 'sp'."
             raise InvalidValueError(message)
         check_relations(self.relations)
 

@@ -11,7 +11,7 @@ from hoz_dist.wire.protocol.pushes import Push
 
 MOST_STATES: Final = 4096
 MOST_STATE_BYTES: Final = 256 * 1024 * 1024
-"""Of all states; those of the paper's sizes and 64 episodes have 0.6 MB."""
+"""Of all states; those of the paper's sizes and 64 episodes have 0.6 MB, with the memory of TPN 3 MB."""
 
 
 class Ended(NamedTuple):

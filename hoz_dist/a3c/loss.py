@@ -101,8 +101,7 @@ def a3c_loss(
 
 
 def _cross_entropy(imitation: Imitation, expert: Tensor, valid: Tensor) -> Tensor:
-    """Return the sum of the cross-entropies with the expert's actions over the steps that count, nats."""
+    """Return the sum of all policies' cross-entropies with the expert's actions over the steps that count, nats."""
     counts = (imitation.counts & valid & (expert >= 0)).float()
-    labels = expert.clamp(min=0).flatten()
-    each = functional.cross_entropy(imitation.logits.flatten(0, 1), labels, reduction="none")
-    return (each * counts.flatten()).sum()
+    chances = functional.log_softmax(imitation.logits, dim=-1).sum(dim=2)
+    return -(chances.gather(-1, expert.clamp(min=0).unsqueeze(-1)).squeeze(-1) * counts).sum()

@@ -25,7 +25,7 @@ _OPTIONS: Final = (
     click.option(
         "--without",
         multiple=True,
-        help="Layer of the model to switch off: object, scene, zone or done (the done reminder); may be repeated.",
+        help="Layer of the model to switch off: object, scene, zone, done (the done reminder) or tpn; may be repeated.",
     ),
     click.option(
         "--relations",

@@ -20,7 +20,8 @@ from hoz_dist.policy.layers import DoneReminder, SceneLayer, ZoneLayer
 from hoz_dist.policy.navigator import Guidance, ZoneState, guide, initial_zone_state
 from hoz_dist.policy.recurrent import EpisodicLSTM
 from hoz_dist.policy.settings import PolicySettings
-from hoz_dist.policy.steering import STEERINGS, Imitation, Memory, Moment, Steered
+from hoz_dist.policy.steering import Imitation, Memory, Moment, Steered
+from hoz_dist.policy.steerings import STEERINGS
 from hoz_dist.policy.tape import Tape
 from hoz_dist.policy.trunks import make_trunk
 
@@ -282,6 +283,7 @@ class ActorCritic(nn.Module):
         moment = Moment(
             logits=over_time(logits),
             outputs=outputs.view(*first.shape, -1),
+            features=over_time(inputs.features),
             picture=over_time(self.trunk.summary(picture).float()),
             detections=over_time(inputs.detections),
             target=over_time(inputs.target),

@@ -36,6 +36,8 @@ class Sizes:
     """Hidden units for each category in `org`."""
     relation: int
     """Outputs for each category in `org`."""
+    tentative: int
+    """S, features of a state that TPN remembers."""
     zones: int
     """D_z, columns of W_z in Eq. 5."""
     lstm: int
@@ -54,6 +56,7 @@ PRESETS: Final[dict[Preset, Sizes]] = {
         prior=32,
         relation_hidden=16,
         relation=4,
+        tentative=32,
         zones=32,
         lstm=128,
         lstm_layers=1,
@@ -68,6 +71,7 @@ PRESETS: Final[dict[Preset, Sizes]] = {
         prior=512,
         relation_hidden=128,
         relation=49,
+        tentative=128,
         zones=10,
         lstm=512,
         lstm_layers=2,

@@ -1,6 +1,6 @@
 """Steerings: what may change the policy's logits after the LSTM, with a memory that lasts an episode.
 
-A method that adapts while it acts (SAVN), or takes over when the agent is stuck (TPN), is a `Steering`. It gets what
+A method that adapts while it acts (SAVN, TPN) has a `Steering`; `hoz_dist.policy.steerings` lists them. It gets what
 `Moment` holds and returns `Steered`. One function serves both ways of running the network: `ActorCritic.act` calls it
 for one step at a time (T = 1, without gradients), `ActorCritic.unroll` for a whole rollout (T steps, with gradients).
 Both must say the same. `Steering.forward` sees to that for who implements `step` alone: it goes step by step and begins
@@ -9,10 +9,10 @@ every episode with the initial memory. Who overrides `forward` to do all steps a
 What gradients do: inside a rollout they go through the memory from step to step, unless the steering detaches them, and
 into the LSTM by way of outputs and logits. The memory before the rollout's first step has none (truncated
 backpropagation, as for the LSTM), and what is kept after the last one is detached. A steering that needs gradients
-while it acts (SAVN's inner step) computes them under ``torch.enable_grad()``: `act` runs without.
+while it acts (SAVN's inner step) writes them out, or computes them under ``torch.enable_grad()``: `act` runs without.
 
-Imitation: a steering with ``imitates = True`` may return an `Imitation`: logits, and at which steps they are to be
-taught the action of a shortest path. That action is a label; it never reaches the network. Who acts (an actor) or
+Imitation: a steering with ``imitates = True`` may return an `Imitation`: policies' logits, and at which steps they are
+to be taught the action of a shortest path. That action is a label; it never reaches the network. Who acts (an actor) or
 learns (a learner from rollouts) looks it up in the rooms it holds (`hoz_dist.sim.expert`) and puts it into
 `Rollout.expert`; `hoz_dist.a3c.loss` adds the cross-entropy with the weight ``RunConfig.imitation_weight``. Without a
 steering that imitates, nothing is looked up.
@@ -20,14 +20,10 @@ steering that imitates, nothing is looked up.
 The value function stays as it is: no steering changes it.
 """
 
-from collections.abc import Callable, Mapping
-from typing import ClassVar, Final, NamedTuple
+from typing import ClassVar, NamedTuple
 
 import torch
 from torch import Tensor, nn
-
-from hoz_dist.policy.methods.description import Layer
-from hoz_dist.policy.settings import PolicySettings
 
 Memory = tuple[Tensor, ...]
 """What a steering remembers of B episodes, each tensor [B, ...]; empty if it remembers nothing."""
@@ -40,6 +36,8 @@ class Moment(NamedTuple):
     """Of the policy, after the done reminder if there is one, [T, B, 6]."""
     outputs: Tensor
     """Of the LSTM, [T, B, H]; the actor's inputs."""
+    features: Tensor
+    """Of the picture as the visual encoder gives them, which has no parameters that are trained, [T, B, C, G, G]."""
     picture: Tensor
     """Summary of the picture's features as the trunk sees them, [T, B, F]."""
     detections: Tensor
@@ -56,7 +54,7 @@ class Imitation(NamedTuple):
     """What is to be taught the expert's action."""
 
     logits: Tensor
-    """[T, B, 6], with gradient."""
+    """Of K policies that are taught at once, [T, B, K, 6], with gradient."""
     counts: Tensor
     """At which steps, bool [T, B]."""
 
@@ -120,7 +118,3 @@ class Steering(nn.Module):
             memory=memory,
             imitation=Imitation(*map(torch.stack, zip(*taught, strict=True))) if taught else None,
         )
-
-
-STEERINGS: Final[Mapping[Layer, Callable[[PolicySettings], Steering]]] = {}
-"""What makes the steerings, by layer."""

@@ -1,4 +1,5 @@
 import json
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -74,6 +75,9 @@ def test_relations_are_the_shipped_ones_unless_given_and_only_of_sp() -> None:
     assert RunConfig.from_json(json.loads(json.dumps(other.to_json()))) == other
     assert config.differences(other)
     assert RunConfig(method="object").relations == ()
+    with pytest.raises(InvalidValueError, match="leave 'relations' empty"):
+        replace(config, method="object")
+    assert replace(config, method="object", relations=()) == RunConfig(method="object")
 
 
 def test_differences_are_named_with_both_values() -> None:

@@ -3,14 +3,14 @@
 from dataclasses import dataclass
 from typing import Literal
 
-Method = Literal["a3c", "object", "sp", "org", "hoz"]
+Method = Literal["a3c", "object", "sp", "savn", "org", "org-tpn", "hoz", "hoz-tpn"]
 """The trained methods."""
-Layer = Literal["object", "sp", "org", "scene", "zone", "done"]
+Layer = Literal["object", "sp", "org", "scene", "zone", "done", "savn", "tpn"]
 """The layers that a method adds to the network that all share; each can be switched off.
 
 Object branches, of which a network has at most one (`hoz_dist.policy.branches`): ``object``, ``sp``, ``org``.
-Steerings, likewise (`hoz_dist.policy.steering`): none yet. Besides, ``scene`` and ``zone`` layer, and ``done``, the
-done reminder.
+Steerings, likewise (`hoz_dist.policy.steerings`): ``savn``, ``tpn``. Besides, ``scene`` and ``zone`` layer, and
+``done``, the done reminder.
 """
 
 

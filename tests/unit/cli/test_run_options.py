@@ -65,7 +65,7 @@ def test_relations_of_a_file_become_part_of_the_configuration(tmp_path: Path) ->
         (["--minutes", "1", "--frames", "2"], "either minutes or frames"),
         (["--encoder", "resnet18"], "--weights"),
         (["--model", "sp", "--relations", "none.json"], "none.json"),
-        (["--relations", str(SHIPPED)], "'sp' alone"),
+        (["--relations", str(SHIPPED)], "take 'sp'"),
     ],
 )
 def test_a_wrong_option_is_said_in_one_sentence(

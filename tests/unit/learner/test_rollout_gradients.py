@@ -82,7 +82,7 @@ def test_what_the_actor_saw_is_seen_again(monkeypatch: pytest.MonkeyPatch) -> No
     assert set(np.unique(again[-1].scene)) == {0, 2}
 
 
-@pytest.mark.parametrize("method", ["a3c", "hoz"])
+@pytest.mark.parametrize("method", ["a3c", "hoz", "savn", "org-tpn"])
 def test_without_lag_the_gradients_are_the_actors_own(method: Method) -> None:
     """Over several rollouts: what one ends with, the next begins with, though it never travels."""
     config = dataclasses.replace(CONFIG, method=method)

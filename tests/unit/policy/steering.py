@@ -10,7 +10,8 @@ from torch import nn
 from hoz_dist.policy.methods import METHODS
 from hoz_dist.policy.methods.description import Layer
 from hoz_dist.policy.settings import PolicySettings
-from hoz_dist.policy.steering import STEERINGS, Imitation, Memory, Moment, Steered, Steering
+from hoz_dist.policy.steering import Imitation, Memory, Moment, Steered, Steering
+from hoz_dist.policy.steerings import STEERINGS
 
 
 class CountingSteering(Steering):
@@ -31,7 +32,7 @@ class CountingSteering(Steering):
     def step(self, moment: Moment, memory: Memory, actor: nn.Linear) -> Steered:
         steps, total = memory[0] + 1, memory[1] + moment.outputs @ self.weight[:, None]
         logits = moment.logits + total * actor.weight.sum(dim=1)
-        return Steered(logits, (steps, total), Imitation(logits, steps % 5 != 0))
+        return Steered(logits, (steps, total), Imitation(logits.unsqueeze(1), steps % 5 != 0))
 
 
 class ImitatingSteering(Steering):
@@ -45,7 +46,7 @@ class ImitatingSteering(Steering):
 
     def step(self, moment: Moment, memory: Memory, actor: nn.Linear) -> Steered:
         del actor
-        return Steered(moment.logits, memory, Imitation(moment.logits, torch.ones_like(moment.first)))
+        return Steered(moment.logits, memory, Imitation(moment.logits.unsqueeze(1), torch.ones_like(moment.first)))
 
 
 def steer_a3c(monkeypatch: pytest.MonkeyPatch, kind: type[Steering]) -> None:

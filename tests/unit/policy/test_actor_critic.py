@@ -52,10 +52,12 @@ def test_unrolling_says_what_acting_said_with_every_method(method: Method, prese
 
 
 def check_unrolling(config: RunConfig, bank: GraphBank) -> None:
-    """Compare acting with unrolling, from a state in the middle of episodes."""
+    """Compare acting with unrolling, from a state in the middle of episodes, some of which come back to views."""
     policy = make_policy(config.policy, 0)
     before, observation = make_observation(3, BATCH, seed=1), make_observation(STEPS, BATCH)
     observation.first[0] = False
+    observation.first[:, :2] = False
+    observation.features[0], observation.features[4:7] = before.features[1], observation.features[1:4]
     start = act_over(policy, before, policy.initial_state(BATCH), bank)[-1].state
     decisions = act_over(policy, observation, start, bank)
     guidance = Guidance(*map(torch.stack, zip(*(decision.guidance for decision in decisions), strict=True)))
@@ -131,12 +133,16 @@ def test_the_state_before_a_rollout_matters(bank: GraphBank) -> None:
 def unroll_once(policy: ActorCritic, bank: GraphBank) -> None:
     """Act and go back over it, so that every parameter has its gradient."""
     observation, start = make_observation(STEPS, BATCH), policy.initial_state(BATCH)
+    observation.first[1:, :2] = False  # long enough to adapt
+    observation.features[4:7] = observation.features[1:4]
     guidances = [decision.guidance for decision in act_over(policy, observation, start, bank)]
     guidance = Guidance(*map(torch.stack, zip(*guidances, strict=True)))
     unrolled = policy.unroll(observation, start, guidance, bank)
     loss = unrolled.logits.square().sum() + unrolled.values.sum()
     if unrolled.scene_logits is not None:
         loss = loss + unrolled.scene_logits.square().sum()
+    if unrolled.imitation is not None:
+        loss = loss + (unrolled.imitation.logits.square().sum(dim=(2, 3)) * unrolled.imitation.counts).sum()
     loss.backward()  # type: ignore[no-untyped-call]
 
 
