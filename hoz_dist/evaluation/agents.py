@@ -11,6 +11,7 @@ from hoz_dist.policy.actor_critic import ActorCritic, Decision
 from hoz_dist.policy.graph_bank import GraphBank
 from hoz_dist.policy.sampling import sample_actions
 from hoz_dist.sim.episode_runner import EpisodeRunner
+from hoz_dist.sim.expert import expert_actions
 from hoz_dist.sim.room_views import RoomViews
 
 
@@ -67,7 +68,7 @@ class OracleAgent:
         Args:
             rooms: The rooms of the episodes.
         """
-        self._rooms = {views.room: views for views in rooms}
+        self._actions = {views.room: expert_actions(views) for views in rooms}
 
     def begin(self, runner: EpisodeRunner, rng: np.random.Generator) -> None:
         """Prepare for the episodes of a runner; nothing is drawn."""
@@ -75,15 +76,11 @@ class OracleAgent:
         self._episodes = runner.episodes
 
     def act(self, runner: EpisodeRunner) -> NDArray[np.int64]:
-        """Choose an action for each episode, [B]: the first of those that lead one step nearer."""
+        """Choose an action for each episode, [B]: the expert's."""
         actions = np.full(len(self._episodes), int(Action.DONE))
         for slot in np.flatnonzero(runner.active).tolist():
             episode = self._episodes[slot]
-            views = self._rooms[episode.room]
-            here = int(runner.local_views[slot])
-            after = views.optimal[views.graph.transitions[here, : Action.DONE], episode.target]
-            if views.optimal[here, episode.target] > 0:
-                actions[slot] = int(np.argmax(after == views.optimal[here, episode.target] - 1))
+            actions[slot] = self._actions[episode.room][runner.local_views[slot], episode.target]
         return actions
 
 
