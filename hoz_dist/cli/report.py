@@ -13,7 +13,7 @@ from hoz_dist.cli.measure import Measurement, measure
 from hoz_dist.cli.progress import duration
 from hoz_dist.evaluation.table import comparison_table
 from hoz_dist.evaluation.trace import trace_episodes
-from hoz_dist.nav.categories import SCENES
+from hoz_dist.nav.categories import ROOM_SCENES, SCENES, scenes_to_tell
 from hoz_dist.nav.episode import Episode
 from hoz_dist.viz.trajectory import draw_trajectories, trajectories_of
 from hoz_dist.viz.zones import png, scene_graph_figure
@@ -87,10 +87,11 @@ def _next_commands(run: Path, scene: str, files: list[str]) -> list[str]:
         files: Options that name the cache and the weights, if they were given.
     """
     connect = ["--connect", DEFAULT_ENDPOINT]
+    telling = [] if scene in ROOM_SCENES else ["--scenes", str(scenes_to_tell([scene]))]
     commands = [
         ["hoz-dist", "evaluate", str(run), "--split", "test", *files],
         ["tensorboard", "--logdir", str(run / "tensorboard")],
-        ["hoz-dist", "learner", "--listen", DEFAULT_ENDPOINT],
+        ["hoz-dist", "learner", "--listen", DEFAULT_ENDPOINT, *telling],
         ["hoz-dist", "actor", "--scene", scene, *connect],
         ["hoz-dist", "query", scene, *connect],
     ]
