@@ -5,9 +5,15 @@ from typing import Any, Final, Literal, get_args
 
 from hoz_dist.errors import InvalidValueError, UnknownNameError
 from hoz_dist.graph.checks import MAX_ZONES
-from hoz_dist.graph.planner import DEFAULT_EDGE_COST, EdgeCost
+from hoz_dist.graph.merging import GraphSource, Merging
+from hoz_dist.graph.planner import DEFAULT_EDGE_COST, EdgeCost, Subgoal
+from hoz_dist.graph.zones import Clustering
+from hoz_dist.nav.categories import ROOM_SCENES, SCENES
 from hoz_dist.nav.pose import PICTURE_SIZE
-from hoz_dist.policy.settings import EncoderName, Layer, Method, PolicySettings, Precision, Preset
+from hoz_dist.policy.methods import METHODS
+from hoz_dist.policy.methods.description import Layer, Method
+from hoz_dist.policy.relations import check_relations, shipped_relations
+from hoz_dist.policy.settings import EncoderName, PolicySettings, Precision, Preset
 
 Compression = Literal["fp32", "bf16", "int8", "topk"]
 """How gradients travel: in full, as halves, as bytes, or their largest entries alone."""
@@ -34,6 +40,9 @@ class RunConfig:
     method: Method = "hoz"
     without: tuple[Layer, ...] = ()
     """Layers of the method that are switched off."""
+    relations: tuple[str, ...] = ()
+    """Related categories, such as ``Bowl+Plate``: the graph of method `sp`, whose default are those of the training
+    rooms; no other method has any, so who makes another method's configuration of one of `sp` empties them."""
     preset: Preset = "compact"
     precision: Precision = "fp32"
     """Of the LSTM's products over rollouts; on processors without products of bf16 they are of fp32."""
@@ -47,6 +56,16 @@ class RunConfig:
     zones: int = 8
     """K, zones of a graph."""
     edge_cost: EdgeCost = DEFAULT_EDGE_COST
+    subgoal: Subgoal = "path"
+    """Which zone the policy is guided to."""
+    clustering: Clustering = "kmeans"
+    """How views become zones."""
+    merge_order: int | None = None
+    """Seed of the order in which rooms are merged; None for ascending numbers."""
+    graph_source: GraphSource = "rooms"
+    """Where scene graphs have their nodes and edges from."""
+    scenes: int = len(ROOM_SCENES)
+    """S, scenes that the scene layer tells apart, the first ones of `SCENES`; runs in apartments need all of them."""
     seed: int = 0
     batch: int = 64
     """B, episodes that an actor runs at once."""
@@ -58,6 +77,8 @@ class RunConfig:
     value_weight: float = 0.5
     scene_weight: float = 0.1
     """Weight of the scene layer's cross-entropy."""
+    imitation_weight: float = 1.0
+    """Weight of the cross-entropy with the expert's actions, of methods that imitate; without effect on others."""
     learning_rate: float = 1e-3
     """Adam's learning rate at the start; falls linearly to 0 over the budget, if there is one."""
     gradient_norm: float = 1.0
@@ -83,6 +104,9 @@ class RunConfig:
             ("precision", self.precision, get_args(Precision)),
             ("encoder", self.encoder, get_args(EncoderName)),
             ("edge cost", self.edge_cost, get_args(EdgeCost)),
+            ("sub-goal", self.subgoal, get_args(Subgoal)),
+            ("clustering", self.clustering, get_args(Clustering)),
+            ("source of graphs", self.graph_source, get_args(GraphSource)),
             ("source to learn from", self.learn_from, get_args(Source)),
             ("compression", self.compress, get_args(Compression)),
             ("form of parameters", self.parameters, get_args(ParametersForm)),
@@ -101,6 +125,12 @@ class RunConfig:
         if self.learn_from == "rollouts" and self.compress != "fp32":
             message = f"Rollouts are no gradients: leave out '{self.compress}' compression, or learn from gradients."
             raise InvalidValueError(message)
+        if "sp" in METHODS[self.method].layers and not self.relations:
+            object.__setattr__(self, "relations", shipped_relations())
+        if "sp" not in METHODS[self.method].layers and self.relations:
+            message = f"Method {self.method} has no graph of related categories: leave 'relations' empty, or take 'sp'."
+            raise InvalidValueError(message)
+        check_relations(self.relations)
 
     @property
     def policy(self) -> PolicySettings:
@@ -110,9 +140,20 @@ class RunConfig:
             self.preset,
             channels=self.channels,
             zones=self.zones,
+            scenes=self.scenes,
             without=self.without,
+            relations=self.relations,
             precision=self.precision,
         )
+
+    def tells(self, scene: str) -> bool:
+        """Say whether the policy can be trained in a scene: its scene layer, if it has one, needs an output for it."""
+        return not self.policy.scene_layer or scene in SCENES[: self.scenes]
+
+    @property
+    def merging(self) -> Merging:
+        """How room graphs become scene graphs."""
+        return Merging(self.merge_order, self.graph_source, self.seed)
 
     @property
     def most_lag(self) -> int:
@@ -125,7 +166,15 @@ class RunConfig:
 
     def to_json(self) -> dict[str, Any]:
         """Return the configuration as JSON values."""
-        return asdict(self) | {"without": list(self.without)}
+        return asdict(self) | {"without": list(self.without), "relations": list(self.relations)}
+
+    def distinguishing(self) -> dict[str, Any]:
+        """Return the fields that tell this run from others, as JSON values.
+
+        Fields that came later are left out where they say what was done before, so that a digest of this stays the same
+        when a field is added.
+        """
+        return {name: value for name, value in self.to_json().items() if name not in _LATER or value != _LATER[name]}
 
     @classmethod
     def from_json(cls, values: object) -> "RunConfig":
@@ -133,7 +182,7 @@ class RunConfig:
 
         Args:
             values: What `to_json` returned, perhaps by way of a file or the network; of an older run, fields that there
-                were not yet have their defaults, which is how it was then.
+                were not yet have the values of `_LATER`, which is how it was then.
 
         Raises:
             InvalidValueError: A field is missing, unknown, of the wrong type or out of range.
@@ -141,7 +190,7 @@ class RunConfig:
         """
         known = {field.name: field for field in fields(cls)}
         if isinstance(values, dict):
-            values = {name: known[name].default for name in _LATER} | values
+            values = _LATER | values
         if not isinstance(values, dict) or set(values) != set(known):
             given = set(values) if isinstance(values, dict) else set()
             wrong = sorted(str(name) for name in given ^ set(known))
@@ -153,7 +202,7 @@ class RunConfig:
             if not _fits(name, value, known[name].default):
                 message = f"'{name}' of the configuration is {value!r}, which is of the wrong type."
                 raise InvalidValueError(message)
-        return cls(**(values | {"without": tuple(values["without"])}))
+        return cls(**(values | {name: tuple(values[name]) for name in ("without", "relations")}))
 
     def differences(self, other: "RunConfig") -> list[str]:
         """Name the fields in which two configurations differ, each as ``name: mine, other's``."""
@@ -166,19 +215,33 @@ def _fits(name: str, value: object, default: object) -> bool:
     match name:
         case "minutes":
             return value is None or type(value) in {int, float}
-        case "frames":
+        case "frames" | "merge_order":
             return value is None or type(value) is int
-        case "without":
-            return isinstance(value, list) and all(type(layer) is str for layer in value)
+        case "without" | "relations":
+            return isinstance(value, list) and all(type(name) is str for name in value)
     return type(value) is type(default) or (type(default) is float and type(value) is int)
 
 
-_LATER: Final = ("precision", "learn_from", "compress", "parameters")
-"""Fields that the first run folders do not have."""
+_LATER: Final[dict[str, Any]] = {
+    "precision": "fp32",
+    "learn_from": "gradients",
+    "compress": "fp32",
+    "parameters": "full",
+    "subgoal": "path",
+    "clustering": "kmeans",
+    "merge_order": None,
+    "graph_source": "rooms",
+    "scenes": len(ROOM_SCENES),
+    "imitation_weight": 1.0,
+    "relations": [],
+}
+"""Fields that the first run folders do not have, and what they were then."""
 _RANGES: Final = (
     ("channels", 1, 4096),
     ("picture_size", 16, 512),
     ("zones", 2, MAX_ZONES),
+    ("scenes", len(ROOM_SCENES), len(SCENES)),
+    ("merge_order", 0, 2**31 - 1),
     ("seed", 0, 2**31 - 1),
     ("batch", 1, 4096),
     # After an episode's end comes a step that only resets, so of two steps one is valid.
@@ -188,6 +251,7 @@ _RANGES: Final = (
     ("entropy_weight", 0.0, 10.0),
     ("value_weight", 0.0, 10.0),
     ("scene_weight", 0.0, 10.0),
+    ("imitation_weight", 0.0, 10.0),
     ("learning_rate", 1e-8, 1.0),
     ("gradient_norm", 1e-3, 1e6),
     ("max_lag", 0, 100_000),

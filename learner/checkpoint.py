@@ -30,7 +30,7 @@ from hoz_dist.config import RunConfig
 from hoz_dist.errors import DamagedFileError, HozError, InvalidValueError, NotFoundError
 from hoz_dist.gradient_forms import Vector
 from hoz_dist.graph.room_graph import RoomGraph
-from hoz_dist.graph.scene_graph import SceneGraph, merge_rooms
+from hoz_dist.graph.scene_graph import SceneGraph
 from learner.optimizer import AdamState
 
 FORMAT: Final = 1
@@ -103,7 +103,8 @@ class Checkpoint:
         scenes: dict[str, list[RoomGraph]] = {}
         for room in self.rooms:
             scenes.setdefault(room.room.partition("/")[0], []).append(room)
-        return {scene: merge_rooms(scene, rooms, self.graph_versions[scene]) for scene, rooms in scenes.items()}
+        merge = self.config.merging.scene_graph
+        return {scene: merge(scene, rooms, self.graph_versions[scene]) for scene, rooms in scenes.items()}
 
 
 class Files(Protocol):

@@ -95,7 +95,7 @@ class LearnerCore:
         self.finished = False
         self._optimizer = FlatAdam(parameters, config.learning_rate)
         self._decompressor = Decompressor(self._optimizer.size)
-        self.graphs = GraphStore(config.zones, room_digests or {})
+        self.graphs = GraphStore(config.zones, room_digests or {}, merging=config.merging)
         self.statistics = Statistics()
         self._seen = SeenPushes()
         self._schedule = schedule
@@ -392,7 +392,9 @@ class LearnerCore:
         self._optimizer = FlatAdam(checkpoint.parameters, self.config.learning_rate)
         self._optimizer.load_state(checkpoint.adam)
         self.version = checkpoint.version
-        self.graphs = GraphStore(self.config.zones, room_digests, checkpoint.rooms, checkpoint.graph_versions)
+        self.graphs = GraphStore(
+            self.config.zones, room_digests, checkpoint.rooms, checkpoint.graph_versions, self.config.merging
+        )
         self.statistics = Statistics(checkpoint.frames, checkpoint.episodes, checkpoint.recent)
         self._seen = SeenPushes(checkpoint.seen)
         self._clock = TrainingClock(checkpoint.seconds)

@@ -6,8 +6,9 @@ from typing import Final
 
 import numpy as np
 
+from hoz_dist.graph.merging import Merging
 from hoz_dist.graph.room_graph import RoomGraph
-from hoz_dist.graph.scene_graph import SceneGraph, merge_rooms
+from hoz_dist.graph.scene_graph import SceneGraph
 from hoz_dist.nav.categories import TARGETS
 from hoz_dist.nav.rooms import RoomId
 from hoz_dist.wire.protocol.rejection import Reason, RejectedError
@@ -26,6 +27,7 @@ class GraphStore:
         digests: The known digests of rooms; a room that is not among them is known by the first graph that came.
         rooms: The room graphs to begin with; those of another content than the known one are left out.
         versions: Version of each scene graph to begin with.
+        merging: How scene graphs are made of them.
     """
 
     def __init__(
@@ -34,8 +36,10 @@ class GraphStore:
         digests: Mapping[str, str],
         rooms: Iterable[RoomGraph] = (),
         versions: Mapping[str, int] | None = None,
+        merging: Merging = Merging(),  # noqa: B008 - frozen
     ) -> None:
         self._zones = zones
+        self._merging = merging
         self._digests = digests
         self._versions = dict(versions or {})
         self._rooms = {room.room: room for room in rooms if self._is_current(room)}
@@ -81,7 +85,7 @@ class GraphStore:
 
     def _merge(self, scene: str) -> SceneGraph:
         rooms = [room for name, room in self._rooms.items() if RoomId.parse(name).scene == scene]
-        return merge_rooms(scene, rooms, self._versions[scene])
+        return self._merging.scene_graph(scene, rooms, self._versions[scene])
 
     def _check(self, graph: RoomGraph) -> None:
         room = RoomId.parse(graph.room)

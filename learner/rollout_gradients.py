@@ -28,6 +28,7 @@ from hoz_dist.nav.rooms import RoomId
 from hoz_dist.policy.graph_bank import GraphBank
 from hoz_dist.policy.navigator import Guidance
 from hoz_dist.policy.parameters import FlatParameters, make_policy
+from hoz_dist.sim.expert import ExpertTable
 from hoz_dist.sim.room_views import RoomViews
 from hoz_dist.sim.row_table import RowTable
 from hoz_dist.sim.view_source import StoredViews
@@ -75,6 +76,7 @@ class RolloutGradients:
         """Why rooms cannot be opened."""
         self._source = StoredViews()
         self._transitions: RowTable[np.int32] = RowTable()
+        self._expert = ExpertTable() if self._policy.imitates else None
         self._epoch = 0
         self._graphs: dict[str, OrderedDict[int, SceneGraph]] = {}
         self._banks: OrderedDict[tuple[tuple[str, int], ...], GraphBank] = OrderedDict()
@@ -110,6 +112,8 @@ class RolloutGradients:
         self._rooms[views.room] = _OpenRoom(views, len(self._transitions))
         self._transitions.append(np.asarray(views.graph.transitions))
         self._source.add_room(views)
+        if self._expert is not None:
+            self._expert.add_room(views)
 
     def has_room(self, room: RoomId) -> bool:
         """Tell whether a room is open."""
@@ -130,6 +134,8 @@ class RolloutGradients:
             RejectedError: The rollout is not of the run's shape, or in rooms that cannot be opened.
         """
         self._check_shape(push.steps)
+        if strange := [used.room for used in push.rooms if not self._config.tells(used.room.scene)]:
+            raise RejectedError(Reason.RANGE, f"the run's scene layer has no output for that of {strange[0]}")
         missing = [used.room for used in push.rooms if used.room not in self._rooms]
         for room in missing:
             if room in self._unusable:
@@ -153,8 +159,8 @@ class RolloutGradients:
         batch = steps.action.shape[1]
         start = self._policy.initial_state(batch) if before is None else before.state
         known = _known(torch.zeros(batch, dtype=torch.bool) if before is None else before.known, steps)
-        behaviour = _behaviour(steps, known)
         observation = self._observation(steps, views, rooms)
+        behaviour = _behaviour(steps, known, self._expert_actions(views[:-1], observation.target[:-1]))
         guidance = Guidance(
             scene=_long(steps.scene),
             fresh=torch.from_numpy(steps.has(Flag.FRESH)),
@@ -178,6 +184,10 @@ class RolloutGradients:
             scene=scenes[steps.room],
             first=steps.has(Flag.FIRST),
         )
+
+    def _expert_actions(self, views: NDArray[np.int64], targets: NDArray[np.int64]) -> Tensor | None:
+        """Look up what the expert would have done at views over all rooms, [T, B], if the policy is taught it."""
+        return None if self._expert is None else torch.from_numpy(self._expert.look_up(views, targets))
 
     def _check_shape(self, steps: Steps) -> None:
         expected = (self._config.rollout_steps, self._config.batch)
@@ -228,7 +238,7 @@ class RolloutGradients:
         key = tuple((graph.scene, graph.version) for graph in graphs)
         if key not in self._banks:
             by_scene = {graph.scene: graph for graph in graphs}
-            self._banks[key] = GraphBank.of(by_scene, self._config.zones, self._config.edge_cost)
+            self._banks[key] = GraphBank.of(by_scene, self._config.zones, self._config.edge_cost, self._config.subgoal)
             if len(self._banks) > _BANKS:
                 self._banks.popitem(last=False)
         self._banks.move_to_end(key)
@@ -246,8 +256,8 @@ def _known(before: Tensor, steps: Steps) -> Tensor:
     return begun | before
 
 
-def _behaviour(steps: Steps, known: Tensor) -> Behaviour:
-    """Return what the actor did; what the state is not known at is not learnt from."""
+def _behaviour(steps: Steps, known: Tensor, expert: Tensor | None) -> Behaviour:
+    """Return what the actor did, and the expert would have done; where the state is not known nothing is learnt."""
     valid = torch.from_numpy(steps.has(Flag.VALID)[:-1])
     return Behaviour(
         actions=_long(steps.action),
@@ -257,6 +267,7 @@ def _behaviour(steps: Steps, known: Tensor) -> Behaviour:
         valid=valid & known,
         log_probabilities=torch.from_numpy(steps.log_probability.copy()),
         taken=int(valid.sum()),
+        expert=expert,
     )
 
 

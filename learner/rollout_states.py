@@ -11,7 +11,7 @@ from hoz_dist.wire.protocol.pushes import Push
 
 MOST_STATES: Final = 4096
 MOST_STATE_BYTES: Final = 256 * 1024 * 1024
-"""Of all states; those of the paper's sizes and 64 episodes have 0.6 MB."""
+"""Of all states; those of the paper's sizes and 64 episodes have 0.6 MB, with the memory of TPN 3 MB."""
 
 
 class Ended(NamedTuple):
@@ -28,12 +28,13 @@ class Ended(NamedTuple):
     def after(cls, push: Push, state: State, known: Tensor) -> Self:
         """Return what a rollout ended with, in memory of its own."""
         zone = ZoneState(*(part.clone() for part in state.zone))
-        return cls(push.incarnation, push.sequence, State(state.lstm.clone(), zone), known.clone())
+        memory = tuple(part.clone() for part in state.memory)
+        return cls(push.incarnation, push.sequence, State(state.lstm.clone(), zone, memory), known.clone())
 
     @property
     def size(self) -> int:
         """Bytes that it takes."""
-        tensors = (self.state.lstm, *self.state.zone, self.known)
+        tensors = (self.state.lstm, *self.state.zone, *self.state.memory, self.known)
         return sum(tensor.numel() * tensor.element_size() for tensor in tensors)
 
 

@@ -114,7 +114,9 @@ class Actor:
         self._stop = stop
         self._clock = clock or StageClock()
         self._timings = timings
-        self._preparation = RoomPreparation(rooms, store, encoder, zones=config.zones, actor=name)
+        self._preparation = RoomPreparation(
+            rooms, store, encoder, zones=config.zones, clustering=config.clustering, actor=name
+        )
         self._env = BatchEnv(config.batch, rng, source=source)
         self._collector = Collector(config, self._env, rng, self._clock)
         self._epoch = link.epoch

@@ -23,6 +23,7 @@ from hoz_dist.policy.parameters import FlatParameters, make_policy
 from hoz_dist.policy.sampling import sample_actions
 from hoz_dist.policy.tape import Tape
 from hoz_dist.sim.batch_env import BatchEnv
+from hoz_dist.sim.expert import ExpertTable
 from hoz_dist.stages import StageClock
 from hoz_dist.wire.protocol.trajectories import Flag, RoomUsed, Steps
 from workers.recording import Acted, Seen, steps_of
@@ -74,8 +75,9 @@ class Collector:
         self.parameters = FlatParameters(self._policy)
         self._differentiator = Differentiator(config, self._policy, self.parameters)
         self._tape = self._policy.tape(config.rollout_steps, config.batch)
-        self._bank = GraphBank(config.zones, config.edge_cost)
+        self._bank = GraphBank(config.zones, config.edge_cost, config.subgoal)
         self._state: State = self._policy.initial_state(config.batch)
+        self._expert = ExpertTable() if self._policy.imitates else None
 
     def use_graph(self, graph: SceneGraph) -> None:
         """Use a scene graph from the next step on.
@@ -110,6 +112,7 @@ class Collector:
             valid=_stack(moment.step.valid for moment in acted),
             values=torch.stack([moment.decision.value for moment in acted]),
             bootstrap=after.decision.value,
+            expert=self._expert_actions(acted),
         )
         observation = Observation(*map(np.stack, zip(*(moment.observation for moment in acted), strict=True)))
         guidance = Guidance(*map(torch.stack, zip(*(moment.decision.guidance for moment in acted), strict=True)))
@@ -143,6 +146,18 @@ class Collector:
             acted.append(Acted(*seen, actions, self._env.step(actions.numpy())))
             self._state = seen.decision.state
         return acted, self._look()
+
+    def _expert_actions(self, acted: list[Acted]) -> Tensor | None:
+        """Look up what the expert would have done at each step, [T, B], if the policy is taught it."""
+        if self._expert is None:
+            return None
+        rooms = self._env.rooms
+        for views in rooms[self._expert.rooms :]:
+            self._expert.add_room(views)
+        starts = np.cumsum([0, *(views.graph.views for views in rooms)])
+        visited = np.stack([starts[moment.places.room] + moment.places.view for moment in acted])
+        targets = np.stack([moment.observation.target for moment in acted])
+        return torch.from_numpy(self._expert.look_up(visited, targets))
 
     def _look(self, tape: Tape | None = None) -> Seen:
         """Perceive the next step."""

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from hoz_dist.graph.room_graph import RoomGraph, explore_room
+from hoz_dist.graph.zones import Clustering
 from hoz_dist.nav.encoder import VisualEncoder
 from hoz_dist.nav.rooms import RoomId
 from hoz_dist.sim.room_views import RoomViews
@@ -27,7 +28,14 @@ class RoomPreparation:
     """
 
     def __init__(
-        self, rooms: Sequence[RoomId], store: ViewStore, encoder: VisualEncoder, *, zones: int, actor: str
+        self,
+        rooms: Sequence[RoomId],
+        store: ViewStore,
+        encoder: VisualEncoder,
+        *,
+        zones: int,
+        actor: str,
+        clustering: Clustering = "kmeans",
     ) -> None:
         """Plan the order; nothing is prepared yet.
 
@@ -37,6 +45,7 @@ class RoomPreparation:
             encoder: The visual encoder.
             zones: K.
             actor: Name of the actor.
+            clustering: How views become zones.
         """
         shuffled = sorted(rooms)
         random.Random(actor).shuffle(shuffled)
@@ -44,6 +53,7 @@ class RoomPreparation:
         self._store = store
         self._encoder = encoder
         self._zones = zones
+        self._clustering: Clustering = clustering
 
     @property
     def waiting(self) -> int:
@@ -69,6 +79,7 @@ class RoomPreparation:
             positions=views.graph.positions,
             bags=views.bag,
             zones=self._zones,
+            clustering=self._clustering,
         )
         self._waiting.popleft()
         return PreparedRoom(views, graph)

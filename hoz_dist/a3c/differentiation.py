@@ -35,6 +35,8 @@ class Behaviour(NamedTuple):
     """Log-probabilities of the actions under that policy, float32 [T, B]."""
     taken: int | None = None
     """Number of actions taken; see `Rollout`."""
+    expert: Tensor | None = None
+    """Action of a shortest path, int64 [T, B]; see `Rollout`."""
 
 
 class Differentiator:
@@ -57,6 +59,7 @@ class Differentiator:
             value=config.value_weight,
             entropy=config.entropy_weight,
             scene=config.scene_weight,
+            imitation=config.imitation_weight,
         )
 
     def on_policy(
@@ -119,7 +122,15 @@ class Differentiator:
     def _descend(self, rollout: Rollout, unrolled: Unrolled, observation: Observation) -> Loss:
         """Compute the loss and its gradient, clipped."""
         scenes = torch.from_numpy(observation.scene)
-        loss = a3c_loss(rollout, unrolled.logits, unrolled.values, self._weights, unrolled.scene_logits, scenes)
+        loss = a3c_loss(
+            rollout,
+            unrolled.logits,
+            unrolled.values,
+            self._weights,
+            unrolled.scene_logits,
+            scenes,
+            unrolled.imitation,
+        )
         self._parameters.gradients.zero_()
         loss.total.backward()  # type: ignore[no-untyped-call]
         clip_norm(self._parameters.gradients, self._largest_norm)

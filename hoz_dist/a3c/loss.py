@@ -1,4 +1,4 @@
-"""The loss of A3C (Mnih et al. 2016, Algorithm S3), and of the scene layer."""
+"""The loss of A3C (Mnih et al. 2016, Algorithm S3), of the scene layer, and of imitation."""
 
 from typing import NamedTuple
 
@@ -9,6 +9,7 @@ from torch.nn import functional
 from hoz_dist.a3c.returns import generalized_advantages
 from hoz_dist.a3c.rollout import Rollout
 from hoz_dist.a3c.vtrace import vtrace
+from hoz_dist.policy.steering import Imitation
 
 ADVANTAGE_FLOOR = 0.05
 """Least scale by which advantages are divided, so that noise is not blown up when nothing differs."""
@@ -22,6 +23,7 @@ class LossWeights(NamedTuple):
     value: float
     entropy: float
     scene: float
+    imitation: float = 0.0
 
 
 class Loss(NamedTuple):
@@ -32,9 +34,10 @@ class Loss(NamedTuple):
     value: float
     entropy: float
     scene: float
+    imitation: float = 0.0
 
     def terms(self) -> dict[str, float]:
-        """Return the terms by the names that are reported."""
+        """Return the terms by the names that are reported: those that every method may have."""
         return {
             "policy_loss": self.policy,
             "value_loss": self.value,
@@ -50,6 +53,7 @@ def a3c_loss(
     weights: LossWeights,
     scene_logits: Tensor | None = None,
     scenes: Tensor | None = None,
+    imitation: Imitation | None = None,
 ) -> Loss:
     """Compute the loss of a rollout, averaged over the actions taken.
 
@@ -66,6 +70,7 @@ def a3c_loss(
         weights: Factors of the terms.
         scene_logits: Of the scene layer, [T, B, S], if it is on.
         scenes: True scenes, int64 [T, B], the labels of `scene_logits`.
+        imitation: What is to be taught the expert's actions, if anything is; the rollout then knows them.
     """
     valid = rollout.valid.float()
     count = max(rollout.frames if rollout.taken is None else rollout.taken, 1)
@@ -88,4 +93,15 @@ def a3c_loss(
     if scene_logits is not None and scenes is not None:
         scene = functional.cross_entropy(scene_logits.flatten(0, 1), scenes.flatten())
         total = total + weights.scene * scene
-    return Loss(total, policy.item(), value.item(), entropy.item(), scene.item())
+    imitated = torch.zeros(())
+    if imitation is not None and rollout.expert is not None:
+        imitated = _cross_entropy(imitation, rollout.expert, rollout.valid) / count
+        total = total + weights.imitation * imitated
+    return Loss(total, policy.item(), value.item(), entropy.item(), scene.item(), imitated.item())
+
+
+def _cross_entropy(imitation: Imitation, expert: Tensor, valid: Tensor) -> Tensor:
+    """Return the sum of all policies' cross-entropies with the expert's actions over the steps that count, nats."""
+    counts = (imitation.counts & valid & (expert >= 0)).float()
+    chances = functional.log_softmax(imitation.logits, dim=-1).sum(dim=2)
+    return -(chances.gather(-1, expert.clamp(min=0).unsqueeze(-1)).squeeze(-1) * counts).sum()

@@ -141,7 +141,7 @@ def _input_gates(policy: ActorCritic) -> list[_Layer]:
 
 def _object_products(policy: ActorCritic, frames: int) -> list[Product]:
     """Return the products A X_o, (A X_o) W_o and H_o' f^v [Eq. 6]."""
-    layer = policy.object_layer
+    layer = policy.object_branch
     if not isinstance(layer, ObjectLayer):
         return []
     categories, features = len(layer.adjacency), layer.weight.shape[1]

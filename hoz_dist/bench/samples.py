@@ -32,7 +32,7 @@ def observations(settings: PolicySettings, *shape: int) -> Observation:
         appearance=rng.random((*shape, len(TARGETS), settings.channels), dtype=np.float32) * seen,
         target=rng.integers(len(TARGETS), size=shape),
         previous_action=rng.integers(NO_ACTION + 1, size=shape),
-        scene=rng.integers(len(SCENES), size=shape),
+        scene=rng.integers(settings.scenes, size=shape),
         first=rng.random(shape) < FIRST_SHARE,
     )
 

@@ -11,6 +11,7 @@ import click
 from hoz_dist.cli.connecting import connect_option, credentials_in, keys_option, run_option, shared_memory_option
 from hoz_dist.cli.options import cache_option, weights_option
 from hoz_dist.cli.stopping import stop_on_signals
+from hoz_dist.errors import InvalidValueError
 from hoz_dist.nav.categories import SCENES
 
 CONNECT_S: Final = 5.0
@@ -106,6 +107,12 @@ def actor_command(
             book = stack.enter_context(Journal(journal)) if journal is not None else None
             stages = stack.enter_context(Timings(timings, clock)) if timings is not None else None
             link = stack.enter_context(LearnerLink(session, actor, run, stop, book, memory, clock))
+            if strange := [room for room in rooms if not link.config.tells(room.scene)]:
+                message = (
+                    f"The scene layer of run {link.run} has no output for {strange[0].scene}: join a run whose learner "
+                    f"was started with --scenes {len(SCENES)}."
+                )
+                raise InvalidValueError(message)
             size = link.config.picture_size
             encoder = matching_encoder(link.config, weights)
             store = ViewStore(cache or default_cache(), size)

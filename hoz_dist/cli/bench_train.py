@@ -20,6 +20,7 @@ from hoz_dist.cli.ports import free_endpoint
 from hoz_dist.cli.processes import Child, Children
 from hoz_dist.cli.run_options import as_arguments, run_config, run_options
 from hoz_dist.errors import HozError, InvalidValueError
+from hoz_dist.nav.categories import scenes_to_tell
 
 if TYPE_CHECKING:
     from hoz_dist.cli.apart import Companion
@@ -86,6 +87,7 @@ def train_command(
     if costs is not None:
         check_writable(costs, overwrite=force)
     rooms = first_rooms(scenes, most_rooms)
+    choices["scenes"] = scenes_to_tell(room.scene for room in rooms)
     config = run_config(choices | {"minutes": None, "frames": None})
     folder = cache or default_cache()
     jobs, counts = len(os.sched_getaffinity(0)), tuple(dict.fromkeys(actors))

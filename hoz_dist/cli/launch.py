@@ -2,7 +2,7 @@
 
 import tempfile
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any, Final
@@ -35,7 +35,13 @@ def sharing(preset: Preset, *, wanted: bool | None = None) -> list[str]:
     return ["--shared-memory"] if share else []
 
 
-def launch(run: Path, endpoint: str, learner: Sequence[str], actor: Sequence[str], actors: int) -> None:
+Tell = Callable[[dict[str, Any]], None]
+"""Is told the status of a run now and then, as `HozClient.status` returns it."""
+
+
+def launch(
+    run: Path, endpoint: str, learner: Sequence[str], actor: Sequence[str], actors: int, tell: Tell | None = None
+) -> None:
     """Train until the run's budget is used up.
 
     Args:
@@ -44,6 +50,7 @@ def launch(run: Path, endpoint: str, learner: Sequence[str], actor: Sequence[str
         learner: Further options of the learner.
         actor: Further options of every actor.
         actors: Number of actors.
+        tell: Told how far the training is; None shows it.
 
     Raises:
         HozError: A process failed; its own words are in the sentence.
@@ -60,7 +67,10 @@ def launch(run: Path, endpoint: str, learner: Sequence[str], actor: Sequence[str
             for number in range(actors):
                 name = f"actor-{number}"
                 start_actor(children, endpoint, name, actor, run / f"{name}.log")
-            _watch(client, core, children)
+            if tell is not None:
+                _watch(client, core, children, tell)
+            else:
+                _show(client, core, children)
 
 
 def start_learner(children: Children, endpoint: str, run: Path, options: Sequence[str], log: Path) -> Child:
@@ -94,28 +104,38 @@ def connect(endpoint: str, learner: Child) -> HozClient | None:
     raise ConnectionFailedError(message)
 
 
-def _watch(client: HozClient, learner: Child, children: Children) -> None:
+def _show(client: HozClient, learner: Child, children: Children) -> None:
     """Show the progress until the learner ends."""
-    pause = threading.Event()
-    actors = [child for child in children if child is not learner]
     summary = ""
     with Progress("Training", 1.0, None) as progress:
-        while (ended := learner.status) != 0:
-            if ended is not None:
-                learner.keep_running()
-            try:
-                status = client.status()
-            except HozError:
-                status = None  # the learner is ending, or starting again
-            if status is not None:
-                summary = _summary(status)
-                # A run that goes on has begun before this process.
-                progress.update(status["progress"] or 0.0, summary, left=status["seconds_left"])
-            # Actors that find no learner, or a finished run, end; that is no failure.
-            for actor in actors if status is not None and not status["finished"] else ():
-                actor.keep_running()
-            pause.wait(POLL_S)
+
+        def tell(status: dict[str, Any]) -> None:
+            nonlocal summary
+            summary = _summary(status)
+            # A run that goes on has begun before this process.
+            progress.update(status["progress"] or 0.0, summary, left=status["seconds_left"])
+
+        _watch(client, learner, children, tell)
         progress.update(1.0, summary)
+
+
+def _watch(client: HozClient, learner: Child, children: Children, tell: Tell) -> None:
+    """Keep the processes running, and tell the progress, until the learner ends."""
+    pause = threading.Event()
+    actors = [child for child in children if child is not learner]
+    while (ended := learner.status) != 0:
+        if ended is not None:
+            learner.keep_running()
+        try:
+            status = client.status()
+        except HozError:
+            status = None  # the learner is ending, or starting again
+        if status is not None:
+            tell(status)
+        # Actors that find no learner, or a finished run, end; that is no failure.
+        for actor in actors if status is not None and not status["finished"] else ():
+            actor.keep_running()
+        pause.wait(POLL_S)
 
 
 def _summary(status: dict[str, Any]) -> str:

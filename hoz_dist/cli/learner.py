@@ -10,6 +10,7 @@ from hoz_dist.cli.options import cache_option, keep_every_option
 from hoz_dist.cli.run_options import run_config, run_options
 from hoz_dist.cli.stopping import stop_on_signals
 from hoz_dist.errors import InvalidValueError
+from hoz_dist.nav.categories import ROOM_SCENES, SCENES
 from hoz_dist.wire.transport.endpoint import DEFAULT_ENCRYPTED_ENDPOINT, DEFAULT_ENDPOINT
 
 if TYPE_CHECKING:
@@ -46,6 +47,20 @@ if TYPE_CHECKING:
     help="Folder of the run; one of the same configuration is resumed. Its last part is the run's name.",
 )
 @run_options
+@click.option(
+    "--scenes",
+    type=click.IntRange(len(ROOM_SCENES), len(SCENES)),
+    default=len(ROOM_SCENES),
+    show_default=True,
+    help=f"How many scenes the scene layer tells apart: {len(ROOM_SCENES)}, or {len(SCENES)} with apartments.",
+)
+@click.option(
+    "--config",
+    "config_file",
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="The whole configuration of the run as JSON, as run folders hold it, instead of the options that make it up.",
+)
 @click.option("--minutes", type=float, help="Budget of training time, minutes.  [default: none, until stopped]")
 @click.option("--frames", type=int, help="Budget of environment frames.  [default: none, until stopped]")
 @shared_memory_option
@@ -73,6 +88,7 @@ def learner_command(
     name: str | None,
     keys: Path | None,
     run: Path,
+    config_file: Path | None,
     checkpoint_seconds: float,
     keep_every: int | None,
     replay: Path | None,
@@ -101,7 +117,7 @@ def learner_command(
         message = "--listen and --connect exclude each other: a learner is a router, or connects to one."
         raise InvalidValueError(message)
     credentials, name = _identity(keys, name, role="router" if connect is None else "learner")
-    config = run_config(choices)
+    config = run_config(choices) if config_file is None else _config_in(config_file)
 
     import torch
 
@@ -129,6 +145,26 @@ def learner_command(
     logging.basicConfig(level=logging.INFO, handlers=[console])
     stop = stop_on_signals()
     serve(settings, stop)
+
+
+def _config_in(file: Path) -> "RunConfig":
+    """Read a configuration.
+
+    Raises:
+        InvalidValueError: The file is not JSON, or a field is missing, unknown or out of range.
+        UnknownNameError: A value of a field with named values does not exist.
+        OSError: It cannot be read.
+    """
+    import json
+
+    from hoz_dist.config import RunConfig
+
+    try:
+        values = json.loads(file.read_bytes())
+    except ValueError as error:
+        message = f"'{file}' is not JSON ({error}); give the config.json of a run folder."
+        raise InvalidValueError(message) from error
+    return RunConfig.from_json(values)
 
 
 def _rooms(config: "RunConfig", weights: Path | None, cache: Path | None) -> "RoomSource":

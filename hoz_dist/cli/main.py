@@ -39,6 +39,8 @@ COMMANDS: Final[dict[str, Entry]] = {
     "query": Entry("hoz_dist.cli.query:query_command", "Ask a learner for a scene graph or a plan."),
     "status": Entry("hoz_dist.cli.status:status_command", "Ask a learner how the run goes."),
     "evaluate": Entry("hoz_dist.cli.evaluate:evaluate_command", "Measure a checkpoint on rooms it was not trained in."),
+    "analyse": Entry("hoz_dist.cli.analyse:analyse_command", "Say why episodes fail, and where SPL is lost."),
+    "reproduce": Entry("hoz_dist.cli.reproduce:reproduce_command", "Make the paper's tables again on unseen rooms."),
     "scenes": Entry("hoz_dist.cli.scenes:scenes_group", "List, show and render the rooms."),
     "graph": Entry("hoz_dist.cli.graph:graph_group", "Build, show, convert and plot graphs, and plan on them."),
     "bench": Entry("hoz_dist.cli.bench:bench_group", "Measure how fast each part is, beside the machine's limits."),

@@ -28,6 +28,48 @@ class Measurement(NamedTuple):
     agent: PolicyAgent
 
 
+def open_benchmark(
+    checkpoint: Checkpoint,
+    *,
+    split: Split,
+    episodes: int,
+    scenes: Sequence[str] = (),
+    weights: Path | None = None,
+    cache: Path | None = None,
+) -> Benchmark:
+    """Open the rooms that a checkpoint is measured in, rendering those that the cache lacks.
+
+    Args:
+        checkpoint: The checkpoint.
+        split: Rooms to use.
+        episodes: Number of episodes in each scene.
+        scenes: Scenes; those that the checkpoint was trained in when there are none.
+        weights: Weights of the resnet18 encoder.
+        cache: Folder of the view store; the default one when None.
+
+    Raises:
+        HozError: A scene does not exist, the checkpoint holds no scene, or the weights are not its own.
+    """
+    for scene in scenes:
+        scene_index(scene)
+    trained = set(checkpoint.graph_versions)
+    wanted = [scene for scene in SCENES if scene in (set(scenes) or trained)]
+    if not wanted:
+        message = "The checkpoint was saved before any room was explored; train longer, or name scenes by --scene."
+        raise NotFoundError(message)
+    config = checkpoint.config
+    encoder = matching_encoder(config, weights)
+    folder = cache or default_cache()
+    store = ViewStore(folder, config.picture_size)
+    names = [room for scene in wanted for room in rooms_of(scene, split)]
+    missing = [room for room in names if not store.holds(room, encoder)]
+    if missing:
+        render_rooms(
+            missing, folder, config.picture_size, len(os.sched_getaffinity(0)), Encoding(config.encoder, weights)
+        )
+    return Benchmark.of([store.open(room, encoder) for room in names], split, episodes)
+
+
 def measure(
     checkpoint: Checkpoint,
     *,
@@ -58,28 +100,12 @@ def measure(
 
     # Results do not depend on the number of cores, and small products gain nothing from more threads.
     torch.set_num_threads(1)
-    for scene in scenes:
-        scene_index(scene)
-    trained = set(checkpoint.graph_versions)
-    wanted = [scene for scene in SCENES if scene in (set(scenes) or trained)]
-    if not wanted:
-        message = "The checkpoint was saved before any room was explored; train longer, or name scenes by --scene."
-        raise NotFoundError(message)
     config = checkpoint.config
     agent = load_agent(config, checkpoint.parameters, checkpoint.scene_graphs())
-    encoder = matching_encoder(config, weights)
-    folder = cache or default_cache()
-    store = ViewStore(folder, config.picture_size)
-    names = [room for scene in wanted for room in rooms_of(scene, split)]
-    missing = [room for room in names if not store.holds(room, encoder)]
-    if missing:
-        render_rooms(
-            missing, folder, config.picture_size, len(os.sched_getaffinity(0)), Encoding(config.encoder, weights)
-        )
-    rooms = [store.open(room, encoder) for room in names]
-    benchmark = Benchmark.of(rooms, split, episodes)
+    benchmark = open_benchmark(checkpoint, split=split, episodes=episodes, scenes=scenes, weights=weights, cache=cache)
     trials = 2 * len(seeds) + 1  # of Random and the policy; Oracle draws nothing and has one
     with Progress("Evaluating", len(benchmark.episodes) * trials, "episodes") as progress:
-        source = partial(LiveViews, encoder, config.picture_size) if live else stored_views
+        encoder = matching_encoder(config, weights) if live else None
+        source = stored_views if encoder is None else partial(LiveViews, encoder, config.picture_size)
         comparison = compare(benchmark, agent, list(seeds), source, progress.update)
     return Measurement(comparison, benchmark, agent)

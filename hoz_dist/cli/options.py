@@ -6,15 +6,15 @@ from typing import Any
 
 import click
 
-from hoz_dist.nav.categories import SCENES
+from hoz_dist.nav.categories import ROOM_SCENES, SCENES
 from hoz_dist.nav.pose import PICTURE_SIZE
 
 scenes_option = click.option(
     "--scene",
     "scenes",
     multiple=True,
-    default=SCENES,
-    show_default="all scenes",
+    default=ROOM_SCENES,
+    show_default=", ".join(ROOM_SCENES),
     help=f"Scene ({', '.join(SCENES)}) or training room (kitchen/3) to train in; may be repeated.",
 )
 

@@ -12,11 +12,10 @@ from hoz_dist.atomic import replace_file, write_atomically
 from hoz_dist.cli.measure import Measurement, measure
 from hoz_dist.cli.progress import duration
 from hoz_dist.evaluation.table import comparison_table
-from hoz_dist.evaluation.trials import trace_episodes
-from hoz_dist.nav.categories import SCENES
+from hoz_dist.evaluation.trace import trace_episodes
+from hoz_dist.nav.categories import ROOM_SCENES, SCENES, scenes_to_tell
 from hoz_dist.nav.episode import Episode
-from hoz_dist.sim.catalogue import load_room
-from hoz_dist.viz.trajectory import Trajectory, draw_trajectories
+from hoz_dist.viz.trajectory import draw_trajectories, trajectories_of
 from hoz_dist.viz.zones import png, scene_graph_figure
 from hoz_dist.wire.transport.endpoint import DEFAULT_ENDPOINT
 from learner.checkpoint import Checkpoint, load_checkpoint
@@ -73,12 +72,8 @@ def _draw_trajectories(measurement: Measurement, path: Path, seed: int) -> Path:
         of_scene = [episode for episode in benchmark.episodes if episode.room.scene == scene]
         by_length = sorted(of_scene, key=lambda episode: episode.optimal)
         chosen += dict.fromkeys((by_length[-1], by_length[len(by_length) // 2]))
-    results, ways = trace_episodes(measurement.agent, benchmark.rooms, chosen, seed)
-    graphs = {views.room: views.graph for views in benchmark.rooms}
-    trajectories = [
-        Trajectory(load_room(result.room), graphs[result.room], way, result, measurement.agent.name)
-        for result, way in zip(results, ways, strict=True)
-    ]
+    traces = trace_episodes(measurement.agent, benchmark.rooms, chosen, seed)
+    trajectories = trajectories_of(traces, benchmark.rooms, measurement.agent.name)
     replace_file(path, lambda temporary: draw_trajectories(trajectories, temporary))
     return path
 
@@ -92,10 +87,11 @@ def _next_commands(run: Path, scene: str, files: list[str]) -> list[str]:
         files: Options that name the cache and the weights, if they were given.
     """
     connect = ["--connect", DEFAULT_ENDPOINT]
+    telling = [] if scene in ROOM_SCENES else ["--scenes", str(scenes_to_tell([scene]))]
     commands = [
         ["hoz-dist", "evaluate", str(run), "--split", "test", *files],
         ["tensorboard", "--logdir", str(run / "tensorboard")],
-        ["hoz-dist", "learner", "--listen", DEFAULT_ENDPOINT],
+        ["hoz-dist", "learner", "--listen", DEFAULT_ENDPOINT, *telling],
         ["hoz-dist", "actor", "--scene", scene, *connect],
         ["hoz-dist", "query", scene, *connect],
     ]

@@ -9,22 +9,29 @@ import click
 
 from hoz_dist.cli.options import picture_size_option, weights_option
 from hoz_dist.config import PRESET_LEARNING_RATES, PRESET_PRECISIONS, RunConfig
+from hoz_dist.policy.methods import METHODS
 
 F = TypeVar("F", bound=Callable[..., Any])
 
+_MODELS: Final = "; ".join(f"{method.name} ({method.summary})" for method in METHODS.values())
 _OPTIONS: Final = (
     click.option(
         "--model",
         "method",
         default=RunConfig.method,
         show_default=True,
-        help="What guides the agent: a3c (nothing), object (object layer) or hoz (object, scene and zone layer, done "
-        "reminder).",
+        help=f"What guides the agent: {_MODELS}.",
     ),
     click.option(
         "--without",
         multiple=True,
-        help="Layer of the model to switch off: object, scene, zone or done (the done reminder); may be repeated.",
+        help="Layer of the model to switch off: object, scene, zone, done (the done reminder) or tpn; may be repeated.",
+    ),
+    click.option(
+        "--relations",
+        type=click.Path(dir_okay=False, path_type=Path),
+        help="Related categories for --model sp: JSON such as [[a, relation, b, count], ...], or relationships.json of "
+        "Visual Genome.  [default: counted in the training rooms]",
     ),
     click.option(
         "--preset", default=RunConfig.preset, show_default=True, help="Sizes of the network: compact or paper."
@@ -98,9 +105,10 @@ def run_config(choices: Mapping[str, Any]) -> RunConfig:
         choices: Values of the options, and ``minutes`` and ``frames``.
 
     Raises:
-        HozError: A value does not exist or is out of range, or the encoder cannot be loaded.
+        HozError: A value does not exist or is out of range, or the encoder or the relations cannot be loaded.
     """
     from hoz_dist.policy.encoders import load_encoder
+    from hoz_dist.policy.relations import read_relations
 
     values = dict(choices)
     weights: Path | None = values.pop("weights")
@@ -108,6 +116,9 @@ def run_config(choices: Mapping[str, Any]) -> RunConfig:
     precision: str | None = values.pop("precision")
     if precision is not None:
         values["precision"] = precision
+    relations: Path | None = values.pop("relations")
+    if relations is not None:
+        values["relations"] = read_relations(relations)
     config = RunConfig(**values)  # checks the names before they are used below
     encoder = load_encoder(config.encoder, weights)
     return replace(

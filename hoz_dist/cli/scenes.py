@@ -3,7 +3,7 @@
 import os
 from collections import Counter
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import click
 
@@ -22,15 +22,23 @@ def scenes_group() -> None:
 def list_command(*, as_json: bool) -> None:
     """List the scenes, the rooms of each split, and the targets of each scene."""
     if as_json:
-        splits = {split: [numbers.start, numbers.stop - 1] for split, numbers in SPLITS.items()}
-        scenes = [{"scene": scene, "splits": splits, "targets": list(SCENE_TARGETS[scene])} for scene in SCENES]
+        scenes = [
+            {
+                "scene": scene,
+                "splits": {split: [numbers.start, numbers.stop - 1] for split, numbers in SPLITS[scene].items()},
+                "targets": list(SCENE_TARGETS[scene]),
+            }
+            for scene in SCENES
+        ]
         echo_json({"scenes": scenes, "categories": list(TARGETS)})
         return
     kinds = {"train": "to train in", "val": "for validation", "test": "for the test"}
-    rooms = ", ".join(f"{numbers.start}-{numbers.stop - 1} {kinds[split]}" for split, numbers in SPLITS.items())
-    click.echo(f"Rooms of each scene: {rooms}. A room is named like kitchen/3.\n")
+    click.echo("A room is named like kitchen/3.\n")
     for scene in SCENES:
-        click.echo(f"{scene}: {len(SCENE_TARGETS[scene])} targets")
+        rooms = ", ".join(
+            f"{numbers.start}-{numbers.stop - 1} {kinds[split]}" for split, numbers in SPLITS[scene].items()
+        )
+        click.echo(f"{scene}: rooms {rooms}; {len(SCENE_TARGETS[scene])} targets")
         click.echo(f"    {' '.join(SCENE_TARGETS[scene])}")
 
 
@@ -57,7 +65,7 @@ def show_command(room: str, *, as_json: bool) -> None:
 @click.argument("names", metavar="ROOM|SCENE...", nargs=-1, required=True)
 @click.option(
     "--split",
-    type=click.Choice(list(SPLITS)),
+    type=click.Choice(get_args(Split)),
     default="train",
     show_default=True,
     help="Which rooms of a SCENE; a ROOM stands for itself.",

@@ -8,6 +8,7 @@ import click
 from hoz_dist.cli.options import cache_option, keep_every_option, scenes_option
 from hoz_dist.cli.ports import free_endpoint
 from hoz_dist.cli.run_options import as_arguments, run_config, run_options
+from hoz_dist.nav.categories import scenes_to_tell
 
 
 @click.command("train")
@@ -63,7 +64,7 @@ def train_command(
     from hoz_dist.nav.rooms import training_rooms
 
     # What is wrong with the options is said before anything starts.
-    training_rooms(scenes)
+    choices["scenes"] = scenes_to_tell(room.scene for room in training_rooms(scenes))
     choices |= {"minutes": 10.0 if minutes is None and frames is None else minutes, "frames": frames}
     config = run_config(choices)
     files = {"weights": choices["weights"], "cache": cache}

@@ -1,16 +1,31 @@
 """The agents that can be evaluated: a trained policy, the floor (Random) and the ceiling (Oracle)."""
 
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hoz_dist.graph.planner import target_zone
 from hoz_dist.nav.actions import Action
-from hoz_dist.policy.actor_critic import ActorCritic
+from hoz_dist.policy.actor_critic import ActorCritic, Decision
 from hoz_dist.policy.graph_bank import GraphBank
 from hoz_dist.policy.sampling import sample_actions
 from hoz_dist.sim.episode_runner import EpisodeRunner
+from hoz_dist.sim.expert import expert_actions
 from hoz_dist.sim.room_views import RoomViews
+
+
+class ZonePlan(NamedTuple):
+    """What the graph told an agent: of B episodes at one step [B], or of one episode at each of its actions [A]."""
+
+    scene: NDArray[np.integer]
+    """Scene whose graph is used, index into `SCENES`; zones of different scenes have nothing to do with each other."""
+    current: NDArray[np.integer]
+    """Current zone."""
+    target: NDArray[np.integer]
+    """Target zone."""
+    subgoal: NDArray[np.integer]
+    """Sub-goal zone."""
 
 
 class Agent(Protocol):
@@ -53,7 +68,7 @@ class OracleAgent:
         Args:
             rooms: The rooms of the episodes.
         """
-        self._rooms = {views.room: views for views in rooms}
+        self._actions = {views.room: expert_actions(views) for views in rooms}
 
     def begin(self, runner: EpisodeRunner, rng: np.random.Generator) -> None:
         """Prepare for the episodes of a runner; nothing is drawn."""
@@ -61,15 +76,11 @@ class OracleAgent:
         self._episodes = runner.episodes
 
     def act(self, runner: EpisodeRunner) -> NDArray[np.int64]:
-        """Choose an action for each episode, [B]: the first of those that lead one step nearer."""
+        """Choose an action for each episode, [B]: the expert's."""
         actions = np.full(len(self._episodes), int(Action.DONE))
         for slot in np.flatnonzero(runner.active).tolist():
             episode = self._episodes[slot]
-            views = self._rooms[episode.room]
-            here = int(runner.local_views[slot])
-            after = views.optimal[views.graph.transitions[here, : Action.DONE], episode.target]
-            if views.optimal[here, episode.target] > 0:
-                actions[slot] = int(np.argmax(after == views.optimal[here, episode.target] - 1))
+            actions[slot] = self._actions[episode.room][runner.local_views[slot], episode.target]
         return actions
 
 
@@ -91,9 +102,24 @@ class PolicyAgent:
     def begin(self, runner: EpisodeRunner, rng: np.random.Generator) -> None:
         """Prepare for the episodes of a runner."""
         self._state, self._rng = self._policy.initial_state(len(runner.episodes)), rng
+        self._targets = np.array([episode.target for episode in runner.episodes])
+        self._decision: Decision | None = None
 
     def act(self, runner: EpisodeRunner) -> NDArray[np.int64]:
         """Choose an action for each episode, [B]."""
         decision = self._policy.act(runner.observe(), self._state, self._bank)
-        self._state = decision.state
+        self._state, self._decision = decision.state, decision
         return sample_actions(decision.logits, self._rng).numpy()
+
+    def zone_plan(self) -> ZonePlan | None:
+        """Return what guided the last actions, [B]; None before the first ones and without the zone layer."""
+        if self._decision is None or not self._policy.settings.zone_layer:
+            return None
+        guidance, nodes = self._decision.guidance, self._decision.state.zone.nodes
+        return ZonePlan(
+            scene=guidance.scene.numpy(),
+            current=guidance.current.numpy(),
+            # As the navigator finds it, in the graph as updated so far this episode.
+            target=target_zone(nodes.numpy(), self._targets),
+            subgoal=guidance.subgoal.numpy(),
+        )

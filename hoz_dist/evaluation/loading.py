@@ -37,7 +37,8 @@ def load_agent(config: RunConfig, parameters: NDArray[np.float32], graphs: Mappi
     if config.policy.zone_layer and not graphs:
         message = "The checkpoint holds no scene graph, so its agent has nothing to be guided by; train longer."
         raise NotFoundError(message)
-    return PolicyAgent(config.method, policy.eval(), GraphBank.of(graphs, config.zones, config.edge_cost))
+    bank = GraphBank.of(graphs, config.zones, config.edge_cost, config.subgoal)
+    return PolicyAgent(config.method, policy.eval(), bank)
 
 
 def matching_encoder(config: RunConfig, weights: Path | None) -> VisualEncoder:

@@ -83,39 +83,26 @@ def run_trials(
     for number, seed in enumerate(all_seeds):
         with source() as views:
             runner = EpisodeRunner(rooms, episodes, source=views)
-            for ended in _play(agent, runner, seed):
+            for _ in play(agent, runner, seed):
                 if progress is not None:
-                    progress(number * len(episodes) + ended, total)
+                    progress(number * len(episodes) + int((~runner.active).sum()), total)
         trials.append(tuple(runner.results()))
     return Evaluation(agent.name, split, tuple(trials))
 
 
-def trace_episodes(
-    agent: Agent, rooms: Sequence[RoomViews], episodes: Sequence[Episode], seed: int
-) -> tuple[list[EpisodeResult], list[NDArray[np.int64]]]:
-    """Run an agent over episodes once.
+def play(agent: Agent, runner: EpisodeRunner, seed: int) -> Iterator[NDArray[np.int64]]:
+    """Run all episodes to their ends; after each step, yield the actions that were chosen, [B].
 
     Args:
         agent: Who acts.
-        rooms: The rooms of the episodes.
-        episodes: What to run.
+        runner: The episodes, none of which has made a step yet.
         seed: Seed of the actions.
-
-    Returns:
-        The results, and the views that each episode visited, its start first, [actions + 1].
     """
-    runner = EpisodeRunner(rooms, episodes)
-    for _ in _play(agent, runner, seed):
-        pass
-    return runner.results(), runner.trajectories()
-
-
-def _play(agent: Agent, runner: EpisodeRunner, seed: int) -> Iterator[int]:
-    """Run all episodes to their ends; after each step, yield the number of those that have ended."""
     agent.begin(runner, np.random.default_rng(seed))
     while runner.active.any():
-        runner.step(agent.act(runner))
-        yield int((~runner.active).sum())
+        actions = agent.act(runner)
+        runner.step(actions)
+        yield actions
 
 
 def _spread(metrics: list[Metrics]) -> dict[str, Any]:

@@ -16,6 +16,9 @@ EdgeCost = Literal["product", "normalized"]
 EDGE_COSTS: Final[tuple[EdgeCost, ...]] = ("product", "normalized")
 DEFAULT_EDGE_COST: Final[EdgeCost] = "normalized"
 """See docs/decisions/edge-cost.md."""
+Subgoal = Literal["path", "target", "random"]
+"""``path``: the second zone of the path, the paper's. ``target``: the target zone itself. ``random``: any zone, one for
+each pair of current and target zone."""
 _LEAST_EDGE: Final = 1e-12
 """Under ``normalized``, weaker edges count as this strong (released code)."""
 _ROUNDING: Final = 1e-12
@@ -147,6 +150,31 @@ def next_hops(edges: NDArray[np.float64], edge_cost: EdgeCost = DEFAULT_EDGE_COS
     nearer = starts & (length[None, :, :] == length[:, None, :] - 1)
     # argmax: the first zone that will do, so the path that comes first in the order of zone numbers.
     return np.where(nearer.any(axis=1), nearer.argmax(axis=1), np.arange(zones))
+
+
+def subgoals(edges: NDArray[np.float64], edge_cost: EdgeCost, subgoal: Subgoal) -> NDArray[np.int64]:
+    """Find the zone that the policy is guided to from every current zone, for every target zone.
+
+    Args:
+        edges: Zone edges, [K, K], in [0, 1].
+        edge_cost: What makes a path short.
+        subgoal: Which zone of the path it is, or none of it. The random ones follow from K alone, so that all who
+            plan on a graph agree.
+
+    Returns:
+        ``zones[current, target]``, int64 [K, K].
+
+    Raises:
+        UnknownNameError: There is no such edge cost.
+    """
+    zones = len(edges)
+    match subgoal:
+        case "path":
+            return next_hops(edges, edge_cost)
+        case "target":
+            return np.tile(np.arange(zones), (zones, 1))
+        case "random":
+            return np.random.default_rng(zones).integers(zones, size=(zones, zones))
 
 
 def edge_costs(edges: NDArray[np.float64], edge_cost: EdgeCost) -> NDArray[np.float64]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from hoz_dist.graph.checks import check_zone_graph
 from hoz_dist.graph.exploration import explore
 from hoz_dist.graph.views import Views, views_at
-from hoz_dist.graph.zones import ZONES, cluster
+from hoz_dist.graph.zones import ZONES, Clustering, cluster
 from hoz_dist.nav.pose import GRID_M
 
 EDGE_REACH_M: Final = 0.25
@@ -49,6 +49,7 @@ def explore_room(
     positions: NDArray[np.int16],
     bags: NDArray[np.bool_],
     zones: int = ZONES,
+    clustering: Clustering = "kmeans",
 ) -> RoomGraph:
     """Explore a room and make its graph; the same room gives the same graph, whoever explores it.
 
@@ -59,14 +60,18 @@ def explore_room(
         positions: Grid coordinates of the positions, int16 [P, 2]; V = 16 P.
         bags: Bag of objects of every view, bool [V, N].
         zones: K.
+        clustering: How views become zones.
 
     Raises:
         InvalidValueError: K is out of range for the room.
     """
-    return build_room_graph(room, digest, views_at(explore(transitions, room), bags, positions), zones)
+    views = views_at(explore(transitions, room), bags, positions)
+    return build_room_graph(room, digest, views, zones, clustering)
 
 
-def build_room_graph(room: str, digest: str, views: Views, zones: int = ZONES) -> RoomGraph:
+def build_room_graph(
+    room: str, digest: str, views: Views, zones: int = ZONES, clustering: Clustering = "kmeans"
+) -> RoomGraph:
     """Make the graph of a room from views of it.
 
     Args:
@@ -74,21 +79,22 @@ def build_room_graph(room: str, digest: str, views: Views, zones: int = ZONES) -
         digest: Digest of the room's content.
         views: M views.
         zones: K.
+        clustering: How views become zones.
 
     Raises:
         InvalidValueError: K is out of range, or there are fewer views than zones.
     """
-    labels = room_zones(room, views, zones)
+    labels = room_zones(room, views, zones, clustering)
     return RoomGraph(room, digest, zone_nodes(views.bags, labels, zones), zone_edges(views.positions, labels, zones))
 
 
-def room_zones(room: str, views: Views, zones: int = ZONES) -> NDArray[np.int64]:
+def room_zones(room: str, views: Views, zones: int = ZONES, clustering: Clustering = "kmeans") -> NDArray[np.int64]:
     """Return the zone of each view as `build_room_graph` has it, int64 [M].
 
     Raises:
         InvalidValueError: K is out of range, or there are fewer views than zones.
     """
-    return cluster(views, zones, seed=zlib.crc32(room.encode()))
+    return cluster(views, zones, zlib.crc32(room.encode()), clustering)
 
 
 def zone_nodes(bags: NDArray[np.bool_], labels: NDArray[np.int64], zones: int) -> NDArray[np.float64]:

@@ -1,5 +1,6 @@
 """The scene graph: the merge of the graphs of a scene's rooms [4.1.2, Alg. 1]."""
 
+import random
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -80,7 +81,11 @@ def top_objects(graph: SceneGraph, zone: int, count: int) -> list[tuple[str, flo
 
 
 def merge_rooms(
-    scene: str, rooms: Iterable[RoomGraph], version: int, categories: tuple[str, ...] = TARGETS
+    scene: str,
+    rooms: Iterable[RoomGraph],
+    version: int,
+    categories: tuple[str, ...] = TARGETS,
+    order: int | None = None,
 ) -> SceneGraph:
     """Merge room graphs into the graph of their scene [Alg. 1].
 
@@ -93,6 +98,7 @@ def merge_rooms(
         rooms: At least one graph of a room of the scene, all with the same number of zones.
         version: Version of the result.
         categories: Names of the categories.
+        order: Seed of another order to take the rooms in; rooms that come later leave the order of the others as it is.
 
     Raises:
         InvalidValueError: There is no room, a room comes twice or is of another scene, or shapes differ.
@@ -100,12 +106,15 @@ def merge_rooms(
     """
     ordered = sorted(rooms, key=lambda graph: RoomId.parse(graph.room).number)
     _check_mergeable(scene, ordered)
+    names = tuple(graph.room for graph in ordered)
+    if order is not None:
+        ordered.sort(key=lambda graph: random.Random(f"merge {order} {graph.room}").random())
     nodes, edges = ordered[0].nodes.copy(), ordered[0].edges.copy()
     for count, room in enumerate(ordered[1:], start=2):
         matched = match(nodes, room.nodes)
         nodes += (room.nodes[matched] - nodes) / count
         edges += (room.edges[np.ix_(matched, matched)] - edges) / count
-    return SceneGraph(scene, version, tuple(graph.room for graph in ordered), categories, nodes, edges)
+    return SceneGraph(scene, version, names, categories, nodes, edges)
 
 
 def _check_mergeable(scene: str, rooms: list[RoomGraph]) -> None:

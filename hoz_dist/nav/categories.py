@@ -1,5 +1,6 @@
 """Object categories and the targets of each scene."""
 
+from collections.abc import Iterable
 from typing import Final
 
 from hoz_dist.errors import UnknownNameError
@@ -61,11 +62,27 @@ SCENE_TARGETS: Final[dict[str, tuple[str, ...]]] = {
     ),
     "bedroom": ("Book", "LightSwitch", "Bowl", "DeskLamp", "Laptop", "Chair", "AlarmClock", "GarbageCan"),
     "bathroom": ("LightSwitch", "GarbageCan", "Sink"),
+    "apartment": (
+        "Book",
+        "Bowl",
+        "Chair",
+        "Plate",
+        "Television",
+        "FloorLamp",
+        "GarbageCan",
+        "AlarmClock",
+        "DeskLamp",
+        "Laptop",
+        "Pot",
+        "CellPhone",
+    ),
 }
-"""The categories that an agent may be sent to find, per scene (released protocol)."""
+"""The categories that an agent may be sent to find, per scene (released protocols of AI2-THOR and RoboTHOR)."""
 
 SCENES: Final[tuple[str, ...]] = tuple(SCENE_TARGETS)
-"""The scenes, in the order of the scene layer's outputs; S = 4."""
+"""The scenes, in the order of the scene layer's outputs; S = 5."""
+ROOM_SCENES: Final[tuple[str, ...]] = SCENES[:4]
+"""The scenes of single rooms: what is trained in unless somebody asks for apartments."""
 
 
 def category_index(name: str) -> int:
@@ -81,6 +98,11 @@ def category_index(name: str) -> int:
         if known.lower() == name.lower():
             return index
     raise UnknownNameError.of("target", name, TARGETS)
+
+
+def scenes_to_tell(scenes: Iterable[str]) -> int:
+    """Return how many outputs a scene layer needs in some scenes: one for each scene of rooms, or for all scenes."""
+    return len(ROOM_SCENES) if set(scenes) <= set(ROOM_SCENES) else len(SCENES)
 
 
 def scene_index(name: str) -> int:

@@ -17,8 +17,8 @@ def seen_pixels(picture_size: int) -> float:
 
 
 def evaluation_cap(scene: str) -> int:
-    """Return the number of actions after which an evaluation episode is truncated (released protocol)."""
-    return 200 if scene == "living_room" else 100
+    """Return the number of actions after which an evaluation episode is truncated (released protocols)."""
+    return {"living_room": 200, "apartment": 500}.get(scene, 100)
 
 
 class Episode(NamedTuple):

@@ -3,12 +3,15 @@
 from typing import Final, Literal, NamedTuple
 
 from hoz_dist.errors import InvalidValueError, UnknownNameError
-from hoz_dist.nav.categories import SCENES
+from hoz_dist.nav.categories import ROOM_SCENES, SCENES
 
 Split = Literal["train", "val", "test"]
 
-SPLITS: Final[dict[Split, range]] = {"train": range(1, 21), "val": range(21, 26), "test": range(26, 31)}
-"""Room numbers of each split, the same for every scene."""
+SPLITS: Final[dict[str, dict[Split, range]]] = {
+    **{scene: {"train": range(1, 21), "val": range(21, 26), "test": range(26, 31)} for scene in ROOM_SCENES},
+    "apartment": {"train": range(1, 61), "val": range(61, 66), "test": range(66, 76)},
+}
+"""Room numbers of each split, by scene (AI2-THOR's and RoboTHOR's sizes)."""
 
 
 class RoomId(NamedTuple):
@@ -23,7 +26,7 @@ class RoomId(NamedTuple):
     @property
     def split(self) -> Split:
         """The split that this room belongs to."""
-        return next(split for split, numbers in SPLITS.items() if self.number in numbers)
+        return next(split for split, numbers in SPLITS[self.scene].items() if self.number in numbers)
 
     @classmethod
     def parse(cls, text: str) -> "RoomId":
@@ -35,8 +38,9 @@ class RoomId(NamedTuple):
         scene, _, number = text.partition("/")
         if scene not in SCENES:
             raise UnknownNameError.of("scene", scene, SCENES)
-        if not (number.isascii() and number.isdigit() and 1 <= int(number) <= SPLITS["test"].stop - 1):
-            message = f"Unknown room '{text}': rooms of {scene} are {scene}/1 to {scene}/{SPLITS['test'].stop - 1}."
+        last = SPLITS[scene]["test"].stop - 1
+        if not (number.isascii() and number.isdigit() and 1 <= int(number) <= last):
+            message = f"Unknown room '{text}': rooms of {scene} are {scene}/1 to {scene}/{last}."
             raise UnknownNameError(message)
         return cls(scene, int(number))
 
@@ -49,7 +53,7 @@ def rooms_of(scene: str, split: Split) -> tuple[RoomId, ...]:
     """
     if scene not in SCENES:
         raise UnknownNameError.of("scene", scene, SCENES)
-    return tuple(RoomId(scene, number) for number in SPLITS[split])
+    return tuple(RoomId(scene, number) for number in SPLITS[scene][split])
 
 
 def training_rooms(names: tuple[str, ...]) -> tuple[RoomId, ...]:
@@ -73,7 +77,8 @@ def training_rooms(names: tuple[str, ...]) -> tuple[RoomId, ...]:
         room = RoomId.parse(name)
         if room.split != "train":
             kept = "validation" if room.split == "val" else "test"
-            first, last = SPLITS["train"].start, SPLITS["train"].stop - 1
+            numbers = SPLITS[room.scene]["train"]
+            first, last = numbers.start, numbers.stop - 1
             message = f"Room {room} is kept for {kept}; train in {room.scene}/{first} to {room.scene}/{last}."
             raise InvalidValueError(message)
         rooms.add(room)

@@ -1,24 +1,27 @@
 """The actor-critic network of all methods: what acts, and what a rollout's gradient is computed through.
 
-One network serves `a3c`, `object` and `hoz`; `PolicySettings` switches the layers. Acting goes step by step and
-decides which scene, zone and sub-goal to use (`act`); training goes over a whole rollout at once with those decisions
-given, as it goes with the actions given (`unroll`).
+One network joins what the layers of a method give (`hoz_dist.policy.methods`); `PolicySettings` says which. Acting goes
+step by step and decides which scene, zone and sub-goal to use (`act`); training goes over a whole rollout at once with
+those decisions given, as it goes with the actions given (`unroll`).
 """
 
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
 from hoz_dist.nav.actions import NO_ACTION, Action
-from hoz_dist.nav.categories import SCENES, TARGETS
+from hoz_dist.nav.categories import TARGETS
 from hoz_dist.nav.observation import Observation
+from hoz_dist.policy.branches import BRANCHES
 from hoz_dist.policy.graph_bank import GraphBank
-from hoz_dist.policy.layers import DoneReminder, ObjectLayer, SceneLayer, ZoneLayer
+from hoz_dist.policy.layers import DoneReminder, SceneLayer, ZoneLayer
 from hoz_dist.policy.navigator import Guidance, ZoneState, guide, initial_zone_state
 from hoz_dist.policy.recurrent import EpisodicLSTM
 from hoz_dist.policy.settings import PolicySettings
+from hoz_dist.policy.steering import Imitation, Memory, Moment, Steered
+from hoz_dist.policy.steerings import STEERINGS
 from hoz_dist.policy.tape import Tape
 from hoz_dist.policy.trunks import make_trunk
 
@@ -30,6 +33,8 @@ class State(NamedTuple):
     """[2, layers, B, cells]."""
     zone: ZoneState
     """Local copy of the scene graph; empty without the zone layer."""
+    memory: Memory = ()
+    """What the steering remembers of the episodes; empty without one."""
 
 
 class Decision(NamedTuple):
@@ -55,7 +60,9 @@ class Unrolled(NamedTuple):
     scene_logits: Tensor | None
     """[T, B, S], or None without the scene layer."""
     state: State
-    """State after the rollout's last step."""
+    """State after the rollout's last step, without gradient."""
+    imitation: Imitation | None
+    """What is to be taught the expert's action, if anything is."""
 
 
 class _Inputs(NamedTuple):
@@ -102,28 +109,40 @@ class ActorCritic(nn.Module):
         super().__init__()
         self.settings = settings
         sizes, categories = settings.sizes, len(TARGETS)
+        branch = next((BRANCHES[layer] for layer in settings.layers if layer in BRANCHES), None)
+        shape = () if branch is None else branch.shape(settings)
+        maps = (shape[0], shape[1]) if len(shape) == _MAPS else None
         context = sizes.target + sizes.action
-        context += sizes.zones * settings.zone_layer + len(SCENES) * settings.scene_layer
+        context += sizes.zones * settings.zone_layer + settings.scenes * settings.scene_layer
+        context += sum(shape) if maps is None else 0
         self.target_embedding = nn.Linear(categories, sizes.target)
         self.action_embedding = nn.Embedding(NO_ACTION + 1, sizes.action)
-        self.trunk = make_trunk(settings, context)
-        self.object_layer = ObjectLayer(categories, sizes.objects) if settings.object_layer else None
+        self.trunk = make_trunk(settings, context, maps)
+        self.object_branch = None if branch is None else branch.make(settings)
         self.scene_layer = (
-            SceneLayer(self.trunk.picture_features, categories, len(SCENES)) if settings.scene_layer else None
+            SceneLayer(self.trunk.picture_features, categories, settings.scenes) if settings.scene_layer else None
         )
         self.zone_layer = ZoneLayer(categories, sizes.zones) if settings.zone_layer else None
         self.lstm = EpisodicLSTM(self.trunk.features, sizes.lstm, sizes.lstm_layers)
         self.actor = nn.Linear(sizes.lstm, len(Action))
         self.critic = nn.Linear(sizes.lstm, 1)
         self.done_reminder = DoneReminder() if settings.done_reminder else None
+        steering = next((STEERINGS[layer] for layer in settings.layers if layer in STEERINGS), None)
+        self.steering = None if steering is None else steering(settings)
         with torch.no_grad():
             # Start near the uniform policy.
             self.actor.weight.mul_(0.1)
             self.actor.bias.zero_()
 
+    @property
+    def imitates(self) -> bool:
+        """Whether a part of it is to be taught the expert's actions, which then have to be looked up."""
+        return self.steering is not None and self.steering.imitates
+
     def initial_state(self, batch: int) -> State:
         """Return the state before any episode's first step."""
-        return State(self.lstm.initial_state(batch), initial_zone_state(batch, self.settings.zones))
+        memory = () if self.steering is None else self.steering.initial_memory(batch)
+        return State(self.lstm.initial_state(batch), initial_zone_state(batch, self.settings.zones), memory)
 
     def tape(self, steps: int, batch: int) -> Tape:
         """Return an empty tape for T steps of B episodes."""
@@ -155,7 +174,11 @@ class ActorCritic(nn.Module):
         joined = self._join(inputs, picture, scene_logits, embedding, tape.dtype)
         outputs = self.lstm.step(joined, first, state.lstm, tape)
         logits, value = self._heads(outputs, inputs)
-        return Decision(logits, value, State(tape.state, zone), guidance)
+        memory = state.memory
+        if self.steering is not None:
+            steered = self._steer(logits, outputs, picture, inputs, first.unsqueeze(0), memory)
+            logits, memory = steered.logits.squeeze(0), steered.memory
+        return Decision(logits, value, State(tape.state, zone, memory), guidance)
 
     def unroll(
         self, observation: Observation, state: State, guidance: Guidance, bank: GraphBank, tape: Tape | None = None
@@ -189,11 +212,15 @@ class ActorCritic(nn.Module):
             self.lstm.record(joined, first, state.lstm, tape)
         outputs = self.lstm.differentiable(joined, tape)
         logits, values = self._heads(outputs.flatten(0, 1), inputs)
+        steered = Steered(logits.view(steps, batch, -1), state.memory)
+        if self.steering is not None:
+            steered = self._steer(logits, outputs, picture, inputs, first, state.memory)
         return Unrolled(
-            logits=logits.view(steps, batch, -1),
+            logits=steered.logits,
             values=values.view(steps, batch),
             scene_logits=None if scene_logits is None else scene_logits.view(steps, batch, -1),
-            state=State(tape.state, zone),
+            state=State(tape.state, zone, tuple(part.detach() for part in steered.memory)),
+            imitation=steered.imitation,
         )
 
     def _scene_logits(self, picture: Tensor, inputs: _Inputs) -> Tensor | None:
@@ -230,8 +257,12 @@ class ActorCritic(nn.Module):
         if zone_embedding is not None:
             context.append(zone_embedding)
         objects = None
-        if self.object_layer is not None:
-            objects = self.object_layer(inputs.detections, inputs.appearance, inputs.target)
+        if self.object_branch is not None:
+            seen = self.object_branch(inputs.detections, inputs.appearance, inputs.target)
+            if seen.ndim == 1 + _MAPS:
+                objects = seen
+            else:
+                context.append(seen)
         with _products_in(dtype):
             return self.trunk(picture, objects, torch.cat(context, dim=1))  # type: ignore[no-any-return]
 
@@ -240,6 +271,30 @@ class ActorCritic(nn.Module):
         if self.done_reminder is not None:
             logits = self.done_reminder(logits, inputs.confidence, inputs.target)
         return logits, self.critic(outputs).squeeze(-1)
+
+    def _steer(
+        self, logits: Tensor, outputs: Tensor, picture: Tensor, inputs: _Inputs, first: Tensor, memory: Memory
+    ) -> Steered:
+        """Let the steering have its say about all steps, [T, B]; its inputs may be flattened."""
+
+        def over_time(values: Tensor) -> Tensor:
+            return values.view(*first.shape, *values.shape[1:])
+
+        moment = Moment(
+            logits=over_time(logits),
+            outputs=outputs.view(*first.shape, -1),
+            features=over_time(inputs.features),
+            picture=over_time(self.trunk.summary(picture).float()),
+            detections=over_time(inputs.detections),
+            target=over_time(inputs.target),
+            previous_action=over_time(inputs.previous_action),
+            first=first,
+        )
+        return self.steering(moment, memory, self.actor)  # type: ignore[no-any-return, misc]
+
+
+_MAPS: Final = 2
+"""Axes of an object branch's maps of one picture; a vector has one."""
 
 
 def _products_in(dtype: torch.dtype) -> torch.autocast:

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import torch
 
-from hoz_dist.graph.planner import EdgeCost, next_hops, normalized_adjacency
+from hoz_dist.graph.planner import EdgeCost, Subgoal, normalized_adjacency, subgoals
 from hoz_dist.graph.scene_graph import SceneGraph
 from hoz_dist.nav.categories import SCENES, TARGETS
 
@@ -19,17 +19,20 @@ class GraphBank:
         available: Whether the scene's graph is known, [S].
     """
 
-    def __init__(self, zones: int, edge_cost: EdgeCost) -> None:
+    def __init__(self, zones: int, edge_cost: EdgeCost, subgoal: Subgoal = "path") -> None:
         self._edge_cost = edge_cost
+        self._subgoal: Subgoal = subgoal
         self.nodes = torch.zeros(len(SCENES), zones, len(TARGETS))
         self.adjacency = torch.zeros(len(SCENES), zones, zones)
         self.subgoals = torch.zeros(len(SCENES), zones, zones, dtype=torch.int64)
         self.available = torch.zeros(len(SCENES), dtype=torch.bool)
 
     @classmethod
-    def of(cls, graphs: Mapping[str, SceneGraph], zones: int, edge_cost: EdgeCost) -> "GraphBank":
+    def of(
+        cls, graphs: Mapping[str, SceneGraph], zones: int, edge_cost: EdgeCost, subgoal: Subgoal = "path"
+    ) -> "GraphBank":
         """Make a bank that holds some graphs, by scene."""
-        bank = cls(zones, edge_cost)
+        bank = cls(zones, edge_cost, subgoal)
         for graph in graphs.values():
             bank.put(graph)
         return bank
@@ -46,5 +49,5 @@ class GraphBank:
             raise ValueError(message)
         self.nodes[index] = torch.from_numpy(graph.nodes)
         self.adjacency[index] = torch.from_numpy(normalized_adjacency(graph.edges))
-        self.subgoals[index] = torch.from_numpy(next_hops(graph.edges, self._edge_cost))
+        self.subgoals[index] = torch.from_numpy(subgoals(graph.edges, self._edge_cost, self._subgoal))
         self.available[index] = True

@@ -98,7 +98,9 @@ def guide(
         evidence = functional.one_hot(true_scene, len(SCENES)).float()
     else:
         remembered = torch.where(first.unsqueeze(1), torch.zeros(()), state.evidence)
-        evidence = remembered + functional.log_softmax(scene_logits, dim=-1)
+        # The scene layer of a run in rooms has no output for apartments.
+        told = functional.log_softmax(scene_logits, dim=-1)
+        evidence = remembered + functional.pad(told, (0, len(SCENES) - told.shape[1]), value=-torch.inf)
     scene = evidence.masked_fill(~bank.available, -torch.inf).argmax(dim=1)
     fresh = first | (scene != state.scene)
     nodes = torch.where(fresh[:, None, None], bank.nodes[scene], state.nodes)

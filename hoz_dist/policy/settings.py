@@ -3,14 +3,15 @@
 from dataclasses import dataclass
 from typing import Final, Literal
 
-Method = Literal["a3c", "object", "hoz"]
+from hoz_dist.nav.categories import ROOM_SCENES
+from hoz_dist.policy.methods import METHODS
+from hoz_dist.policy.methods.description import Layer, Method
+
 Preset = Literal["compact", "paper"]
 EncoderName = Literal["pooled", "resnet18"]
 Precision = Literal["fp32", "bf16"]
 """Of the products over rollouts, most of the arithmetic: their factors and results, and the maps of the trunk.
 Parameters, cells, activations of the LSTM, heads and loss are always fp32; sums within a product are, too."""
-Layer = Literal["object", "scene", "zone", "done"]
-"""Layers that can be switched off: object, scene and zone layer, done reminder."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,6 +28,16 @@ class Sizes:
     """Features of the previous action."""
     objects: int
     """D_o, columns of W_o in Eq. 6."""
+    prior_nodes: int
+    """Features of a node of the graph of `sp`."""
+    prior: int
+    """Output of the graph of `sp`."""
+    relation_hidden: int
+    """Hidden units for each category in `org`."""
+    relation: int
+    """Outputs for each category in `org`."""
+    tentative: int
+    """S, features of a state that TPN remembers."""
     zones: int
     """D_z, columns of W_z in Eq. 5."""
     lstm: int
@@ -35,18 +46,37 @@ class Sizes:
 
 
 PRESETS: Final[dict[Preset, Sizes]] = {
-    "compact": Sizes(trunk="vector", picture=64, target=16, action=8, objects=16, zones=32, lstm=128, lstm_layers=1),
-    # 49 object features: H_o' f^v then has one row per cell of the 7 x 7 grid, as in the released code.
-    "paper": Sizes(trunk="grid", picture=64, target=10, action=10, objects=49, zones=10, lstm=512, lstm_layers=2),
+    "compact": Sizes(
+        trunk="vector",
+        picture=64,
+        target=16,
+        action=8,
+        objects=16,
+        prior_nodes=32,
+        prior=32,
+        relation_hidden=16,
+        relation=4,
+        tentative=32,
+        zones=32,
+        lstm=128,
+        lstm_layers=1,
+    ),
+    "paper": Sizes(
+        trunk="grid",
+        picture=64,
+        target=10,
+        action=10,
+        objects=49,  # H_o' f^v then has one row per cell of the 7 x 7 grid, as in the released code
+        prior_nodes=256,  # SAVN's re-implementation has 1024, which would cost more than all the rest of the network
+        prior=512,
+        relation_hidden=128,
+        relation=49,
+        tentative=128,
+        zones=10,
+        lstm=512,
+        lstm_layers=2,
+    ),
 }
-
-
-METHOD_LAYERS: Final[dict[Method, tuple[Layer, ...]]] = {
-    "a3c": (),
-    "object": ("object",),
-    "hoz": ("object", "scene", "zone", "done"),
-}
-"""The layers of each method, besides picture, target indicator and previous action."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,12 +88,14 @@ class PolicySettings:
     """C of the visual encoder."""
     grid: int = 7
     """G of the visual encoder."""
-    object_layer: bool = True
-    scene_layer: bool = True
-    zone_layer: bool = True
-    done_reminder: bool = True
+    layers: tuple[Layer, ...] = METHODS["hoz"].layers
+    """What is added to the network that all methods share."""
+    relations: tuple[str, ...] = ()
+    """Related categories, such as ``Bowl+Plate``: the graph of `sp`."""
     zones: int = 8
     """K of the scene graphs."""
+    scenes: int = len(ROOM_SCENES)
+    """S, outputs of the scene layer."""
     precision: Precision = "fp32"
     """Of the LSTM's products over rollouts; has no part in the parameters."""
 
@@ -75,18 +107,33 @@ class PolicySettings:
         *,
         channels: int,
         zones: int,
+        scenes: int = len(ROOM_SCENES),
         without: tuple[Layer, ...] = (),
+        relations: tuple[str, ...] = (),
         precision: Precision = "fp32",
     ) -> "PolicySettings":
         """Return the settings of a method, less some of its layers."""
-        layers = set(METHOD_LAYERS[method]) - set(without)
         return cls(
             sizes=PRESETS[preset],
             channels=channels,
             zones=zones,
-            object_layer="object" in layers,
-            scene_layer="scene" in layers,
-            zone_layer="zone" in layers,
-            done_reminder="done" in layers,
+            scenes=scenes,
+            layers=tuple(layer for layer in METHODS[method].layers if layer not in without),
+            relations=relations,
             precision=precision,
         )
+
+    @property
+    def scene_layer(self) -> bool:
+        """Whether the network guesses the scene."""
+        return "scene" in self.layers
+
+    @property
+    def zone_layer(self) -> bool:
+        """Whether scene graphs guide the agent."""
+        return "zone" in self.layers
+
+    @property
+    def done_reminder(self) -> bool:
+        """Whether the target's confidence scales Done's logit."""
+        return "done" in self.layers

@@ -13,20 +13,21 @@ class VectorTrunk(nn.Module):
     Args:
         settings: What shapes the network.
         context: X, the sum of the sizes of all vector inputs.
+        maps: Shape [M, W] of the object branch's maps; None without maps.
 
     Attributes:
         features: Size of the output.
         picture_features: F, size of what the scene layer sees of the picture.
     """
 
-    def __init__(self, settings: PolicySettings, context: int) -> None:
+    def __init__(self, settings: PolicySettings, context: int, maps: tuple[int, int] | None) -> None:
         super().__init__()
         sizes = settings.sizes
         self.picture = nn.Linear(settings.channels * settings.grid**2, sizes.picture)
         self.picture_features = sizes.picture
         self.features = sizes.picture + context
-        if settings.object_layer:
-            self.features += sizes.objects * (settings.channels + 1)
+        if maps is not None:
+            self.features += maps[0] * maps[1]
 
     def see(self, features: Tensor) -> Tensor:
         """Map feature grids [B, C, G, G] to picture features [B, F]."""
@@ -41,7 +42,7 @@ class VectorTrunk(nn.Module):
 
         Args:
             picture: What `see` returned.
-            objects: H_o' f^v, [B, D_o, C + 1], or None without the object layer.
+            objects: Maps of the object branch, [B, M, W], or None without maps.
             context: All vectors, [B, X].
 
         Returns:
@@ -54,18 +55,19 @@ class VectorTrunk(nn.Module):
 class GridTrunk(nn.Module):
     """Every input is a map over the 7 x 7 grid; pointwise convolutions join them to 64 x 7 x 7 features.
 
-    Arguments and attributes are those of `VectorTrunk`.
+    The object branch's maps have one row for each cell of the grid, M = G * G. Arguments and attributes are those of
+    `VectorTrunk`.
     """
 
-    def __init__(self, settings: PolicySettings, context: int) -> None:
+    def __init__(self, settings: PolicySettings, context: int, maps: tuple[int, int] | None) -> None:
         super().__init__()
         sizes = settings.sizes
         self.cells = settings.grid**2
         self.picture = nn.Linear(settings.channels, sizes.picture)
         self.picture_features = sizes.picture
         joined = sizes.picture + context
-        if settings.object_layer:
-            self.objects = nn.Linear(settings.channels + 1, sizes.picture)
+        if maps is not None:
+            self.objects = nn.Linear(maps[1], sizes.picture)
             joined += sizes.picture
         self.join = nn.Linear(joined, sizes.picture)
         self.features = sizes.picture * self.cells
@@ -90,11 +92,13 @@ class GridTrunk(nn.Module):
         return functional.relu(joined).flatten(1)
 
 
-def make_trunk(settings: PolicySettings, context: int) -> VectorTrunk | GridTrunk:
+def make_trunk(settings: PolicySettings, context: int, maps: tuple[int, int] | None = None) -> VectorTrunk | GridTrunk:
     """Make the trunk of a preset.
 
     Args:
         settings: The policy's settings.
         context: X, the sum of the sizes of all vector inputs.
+        maps: Shape [M, W] of the object branch's maps; None without maps.
     """
-    return VectorTrunk(settings, context) if settings.sizes.trunk == "vector" else GridTrunk(settings, context)
+    kind = VectorTrunk if settings.sizes.trunk == "vector" else GridTrunk
+    return kind(settings, context, maps)

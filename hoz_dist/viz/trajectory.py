@@ -11,11 +11,14 @@ from matplotlib.figure import Figure
 from matplotlib.patches import FancyBboxPatch, Rectangle
 from numpy.typing import NDArray
 
+from hoz_dist.evaluation.trace import EpisodeTrace
 from hoz_dist.nav.categories import TARGETS
 from hoz_dist.nav.episode import SUCCESS_DISTANCE_M, EpisodeResult
 from hoz_dist.nav.pose import GRID_M
+from hoz_dist.sim.catalogue import load_room
 from hoz_dist.sim.pose_graph import PoseGraph
 from hoz_dist.sim.room import Item, Part, Room
+from hoz_dist.sim.room_views import RoomViews
 
 _OVERHEAD_M: Final = 2.0
 """What begins above this height, metres, such as the ceiling, would hide all else."""
@@ -26,21 +29,36 @@ class Trajectory(NamedTuple):
 
     room: Room
     graph: PoseGraph
-    views: NDArray[np.int64]
+    views: NDArray[np.integer]
     """Views that were visited, the start first, [actions + 1]."""
     result: EpisodeResult
     agent: str
     """Who went this way."""
 
 
-def draw_trajectories(trajectories: Sequence[Trajectory], path: Path) -> None:
+def trajectories_of(traces: Sequence[EpisodeTrace], rooms: Sequence[RoomViews], agent: str) -> list[Trajectory]:
+    """Return what is to be drawn of traced episodes.
+
+    Args:
+        traces: The episodes.
+        rooms: The rooms of the episodes.
+        agent: Who went these ways.
+    """
+    graphs = {views.room: views.graph for views in rooms}
+    return [
+        Trajectory(load_room(result.room), graphs[result.room], views, result, agent) for result, views, _, _ in traces
+    ]
+
+
+def draw_trajectories(trajectories: Sequence[Trajectory], path: Path, columns: int = 4) -> None:
     """Draw trajectories side by side and write them as a PNG file.
 
     Args:
         trajectories: At least one.
         path: File to write, whatever its extension; its folder is made if need be.
+        columns: Most of them in a row: two agents' ways in the same episodes, by turns, stand side by side in 2 or 4.
     """
-    columns = min(4, len(trajectories))
+    columns = min(columns, len(trajectories))
     rows = -(-len(trajectories) // columns)
     figure = Figure(figsize=(4.2 * columns, 4.4 * rows), layout="constrained")
     FigureCanvasAgg(figure)

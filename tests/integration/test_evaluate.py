@@ -10,15 +10,8 @@ import pytest
 
 from hoz_dist.cli.main import run
 from hoz_dist.config import RunConfig
-from hoz_dist.nav.categories import TARGETS
-from hoz_dist.nav.rooms import RoomId
-from hoz_dist.policy.parameters import initial_parameters
-from hoz_dist.wire.protocol.pushes import RoomGraphPush
-from learner.checkpoint import save_checkpoint
-from learner.core import LearnerCore
-from learner.events import RoomGraphReceived
 from tests.integration.commands import hoz_dist
-from tests.integration.learning import graph_of
+from tests.integration.runs import save_run
 
 pytestmark = pytest.mark.integration
 
@@ -27,15 +20,8 @@ EPISODES = 20
 
 @pytest.fixture(scope="module")
 def run_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A run whose agent knows a bathroom's graph and has not learned anything yet."""
-    config = RunConfig()
-    core = LearnerCore(config, initial_parameters(config.policy, config.seed))
-    graph = graph_of("bathroom/1", zones=config.zones)
-    push = RoomGraphPush("a", 1, 0, RoomId("bathroom", 1), graph.digest, TARGETS, graph.nodes, graph.edges)
-    core.handle(RoomGraphReceived(0, push), now=0.0)
-    folder = tmp_path_factory.mktemp("run")
-    save_checkpoint(folder / "checkpoints", core.snapshot(0.0))
-    return folder
+    """A run that has not learned anything yet."""
+    return save_run(tmp_path_factory.mktemp("run"), RunConfig())
 
 
 def words_for(checkpoint: Path, cache: Path, seed: int) -> list[str]:

@@ -14,6 +14,18 @@ from hoz_dist.nav.categories import SCENE_TARGETS
 pytestmark = pytest.mark.integration
 
 
+def test_list_says_which_rooms_and_targets_each_scene_has(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["scenes", "list", "--json"]) == 0
+    scenes = {facts["scene"]: facts for facts in json.loads(capsys.readouterr().out)["scenes"]}
+    assert scenes["kitchen"]["splits"] == {"train": [1, 20], "val": [21, 25], "test": [26, 30]}
+    assert scenes["apartment"]["splits"] == {"train": [1, 60], "val": [61, 65], "test": [66, 75]}
+    assert scenes["apartment"]["targets"] == list(SCENE_TARGETS["apartment"])
+
+    assert run(["scenes", "list"]) == 0
+    text = capsys.readouterr().out
+    assert "apartment: rooms 1-60 to train in, 61-65 for validation, 66-75 for the test; 12 targets\n" in text
+
+
 def test_show_says_what_is_in_a_room(capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["scenes", "show", "bathroom/1", "--json"]) == 0
     facts = json.loads(capsys.readouterr().out)

@@ -61,4 +61,4 @@ def test_wheel_works_in_an_empty_environment(wheel: Path, tmp_path: Path) -> Non
     command = environment / "bin" / "hoz-dist"
     assert "Usage: hoz-dist" in run(command, "--help")
     assert run(command, "--version") == f"hoz-dist, version {__version__}\n"
-    assert run(command, "scenes", "list").startswith("Rooms of each scene")
+    assert run(command, "scenes", "list").startswith("A room is named like kitchen/3.")

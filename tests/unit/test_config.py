@@ -1,4 +1,5 @@
 import json
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -6,6 +7,7 @@ import pytest
 from hoz_dist.config import RunConfig
 from hoz_dist.errors import HozError, InvalidValueError, UnknownNameError
 from hoz_dist.policy.encoders.pooled import PooledEncoder
+from hoz_dist.policy.relations import shipped_relations
 
 
 def test_json_and_back() -> None:
@@ -27,6 +29,9 @@ def test_json_and_back() -> None:
         ({"batch": True}, InvalidValueError),
         ({"seed": 0.5}, InvalidValueError),
         ({"colour": "red"}, InvalidValueError),
+        ({"method": "sp", "relations": ["Bowl"]}, InvalidValueError),
+        ({"relations": ["Bowl+Plate"]}, InvalidValueError),
+        ({"method": "sp", "relations": "Bowl+Plate"}, InvalidValueError),
     ],
 )
 def test_bad_values_are_refused_in_one_sentence(change: dict[str, Any], error: type[HozError]) -> None:
@@ -44,12 +49,35 @@ def test_what_is_no_configuration_is_refused(values: object) -> None:
 
 def test_a_run_from_before_there_was_a_choice_is_what_was_done_then() -> None:
     values = RunConfig(preset="paper", seed=3).to_json()
-    for later in ("precision", "learn_from", "compress", "parameters"):
+    for later in (
+        "precision",
+        "learn_from",
+        "compress",
+        "parameters",
+        "subgoal",
+        "clustering",
+        "merge_order",
+        "graph_source",
+        "imitation_weight",
+        "relations",
+    ):
         del values[later]
     assert RunConfig.from_json(values) == RunConfig(preset="paper", seed=3)
     del values["method"]
     with pytest.raises(HozError, match="missing or unknown: method"):
         RunConfig.from_json(values)
+
+
+def test_relations_are_the_shipped_ones_unless_given_and_only_of_sp() -> None:
+    config = RunConfig(method="sp")
+    assert config.relations == config.policy.relations == shipped_relations()
+    other = RunConfig(method="sp", relations=("Bowl+Plate",))
+    assert RunConfig.from_json(json.loads(json.dumps(other.to_json()))) == other
+    assert config.differences(other)
+    assert RunConfig(method="object").relations == ()
+    with pytest.raises(InvalidValueError, match="leave 'relations' empty"):
+        replace(config, method="object")
+    assert replace(config, method="object", relations=()) == RunConfig(method="object")
 
 
 def test_differences_are_named_with_both_values() -> None:
@@ -60,3 +88,10 @@ def test_differences_are_named_with_both_values() -> None:
 def test_defaults_describe_the_default_encoder() -> None:
     encoder = PooledEncoder()
     assert (RunConfig().encoder_key, RunConfig().channels) == (encoder.key, encoder.channels)
+
+
+def test_what_tells_runs_apart_does_not_change_when_fields_are_added() -> None:
+    values = RunConfig(method="a3c").distinguishing()
+    assert values["method"] == "a3c"
+    assert "clustering" not in values
+    assert RunConfig(clustering="random").distinguishing()["clustering"] == "random"

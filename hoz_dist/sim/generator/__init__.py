@@ -6,6 +6,7 @@ from typing import Final
 
 from hoz_dist.nav.rooms import RoomId
 from hoz_dist.sim.generator import bathroom, bedroom, kitchen, living_room
+from hoz_dist.sim.generator.apartment import make_apartment
 from hoz_dist.sim.generator.floor_plan import FloorPlan
 from hoz_dist.sim.generator.shell import shell
 from hoz_dist.sim.room import Room
@@ -39,6 +40,8 @@ def generate_room(room: RoomId, attempt: int) -> Room:
         attempt: Counts the tries to make a room whose targets can all be reached and seen.
     """
     rng = Random(f"hoz-dist {room} {attempt}")
+    if room.scene == "apartment":
+        return make_apartment(room, rng)
     (least_width, most_width), (least_depth, most_depth) = _EXTENTS[room.scene]
     plan = FloorPlan(
         rng,
@@ -50,4 +53,4 @@ def generate_room(room: RoomId, attempt: int) -> Room:
     walls = shell(plan, rng.choice(_FLOORS[room.scene]), tiles=tiles)
     _FURNISH[room.scene](plan)
     # The walls come last: PyBullet draws in this order and spends no time on what is hidden by things drawn before.
-    return Room(room, plan.width / 1000, plan.depth / 1000, (*plan.items, walls))
+    return Room(room, plan.width / 1000, plan.depth / 1000, (*plan.items, walls.item))

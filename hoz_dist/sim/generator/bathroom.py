@@ -13,13 +13,7 @@ def furnish(plan: FloorPlan) -> None:
     """Furnish a bathroom."""
     rng = plan.rng
     entrance(plan, tuple(plan.any_walls()))
-    bathing = rng.choices(("tub", "shower", "both"), (50, 32, 18))[0]
-    if bathing in {"tub", "both"}:
-        plan.against_wall(bathroom_fixtures.bathtub(rng), plan.any_walls(), access=600, margin=10)
-    _washing_place(plan)
-    plan.against_wall(bathroom_fixtures.toilet(rng), plan.any_walls(), access=550, margin=150)
-    if bathing in {"shower", "both"}:
-        plan.against_wall(bathroom_fixtures.shower(rng), plan.any_walls(), access=600, margin=10)
+    fixtures(plan)
     plan.against_wall(small_things.garbage_can(rng), plan.any_walls(), access=250, margin=40)
     for make, chance in ((bathroom_fixtures.bathroom_shelf, 65), (bathroom_fixtures.hamper, 60)):
         if rng.randrange(100) < chance:
@@ -32,6 +26,18 @@ def furnish(plan: FloorPlan) -> None:
     pictures(plan, rng.randint(0, 1))
     if rng.random() < 0.8:
         free_rug(plan, 800, 550)
+
+
+def fixtures(plan: FloorPlan) -> None:
+    """Place bathtub or shower or both, wash-basin and toilet."""
+    rng = plan.rng
+    bathing = rng.choices(("tub", "shower", "both"), (50, 32, 18))[0]
+    if bathing in {"tub", "both"}:
+        plan.against_wall(bathroom_fixtures.bathtub(rng), plan.any_walls(), access=600, margin=10)
+    _washing_place(plan)
+    plan.against_wall(bathroom_fixtures.toilet(rng), plan.any_walls(), access=550, margin=150)
+    if bathing in {"shower", "both"}:
+        plan.against_wall(bathroom_fixtures.shower(rng), plan.any_walls(), access=600, margin=10)
 
 
 def _washing_place(plan: FloorPlan) -> None:

@@ -11,7 +11,7 @@ def furnish(plan: FloorPlan) -> None:
     """Furnish a bedroom."""
     rng = plan.rng
     entrance(plan, tuple(plan.any_walls()))
-    _bed(plan)
+    place_bed(plan)
     if rng.random() < 0.9:
         workplace(plan)
     for make, chance in (
@@ -39,7 +39,7 @@ def furnish(plan: FloorPlan) -> None:
         free_rug(plan, 1700, 1100)
 
 
-def _bed(plan: FloorPlan) -> None:
+def place_bed(plan: FloorPlan) -> None:
     """Place the bed, its head at a wall, with a table on one side or both."""
     rng = plan.rng
     model = seating.bed(rng, rng.choice((1000, 1400, 1500, 1600, 1700)))

@@ -31,7 +31,7 @@ class Surface(NamedTuple):
 class FloorPlan:
     """Places models so that nothing interpenetrates and the agent's ways stay free."""
 
-    def __init__(self, rng: Random, width: int, depth: int, height: int) -> None:
+    def __init__(self, rng: Random, width: int, depth: int, height: int, *, outer: tuple[int, ...] = WALLS) -> None:
         """Start with an empty room.
 
         Args:
@@ -39,11 +39,13 @@ class FloorPlan:
             width: Extent along x.
             depth: Extent along z.
             height: Of the ceiling.
+            outer: Walls with nothing but the open air behind them; they may have windows.
         """
         self.rng = rng
         self.width = width
         self.depth = depth
         self.height = height
+        self.outer = outer
         self.placed: list[Placed] = []
         self.kept: list[Rect] = []
 

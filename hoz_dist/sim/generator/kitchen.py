@@ -16,7 +16,7 @@ _LEAST_COUNTER: Final = 300
 _CABINET_HEIGHT: Final = 1450
 
 
-class _Run(NamedTuple):
+class Run(NamedTuple):
     """A stretch of a wall with worktops."""
 
     wall: int
@@ -31,7 +31,7 @@ def furnish(plan: FloorPlan) -> None:
     rng = plan.rng
     style = CabinetStyle.draw(rng)
     runs = _runs(plan, style)
-    _fill_runs(plan, style, runs)
+    fill_runs(plan, style, runs)
     used = {run.wall for run in runs}
     entrance(plan, tuple(sorted(plan.any_walls(), key=lambda wall: wall in used)))
     if rng.random() < 0.3:
@@ -53,12 +53,12 @@ def furnish(plan: FloorPlan) -> None:
         free_rug(plan, 1200, 700)
 
 
-def _runs(plan: FloorPlan, style: CabinetStyle) -> list[_Run]:
+def _runs(plan: FloorPlan, style: CabinetStyle) -> list[Run]:
     """Choose along which walls the worktops go: one, an L, two opposite ones, or a U."""
     rng = plan.rng
     wall = rng.randrange(4)
     length = plan.wall_length(wall)
-    runs = [_Run(wall, 0, length, rng.choice((-1, 1)))]
+    runs = [Run(wall, 0, length, rng.choice((-1, 1)))]
     kind = rng.choices(("one", "L", "galley", "U"), (15, 45, 22, 18))[0]
     side = rng.choice((-1, 1))
     sides = {"one": (), "galley": (), "L": (side,), "U": (-1, 1)}[kind]
@@ -68,18 +68,18 @@ def _runs(plan: FloorPlan, style: CabinetStyle) -> list[_Run]:
         full = plan.wall_length(other)
         reach = style.depth + min(full - style.depth - 1100, rng.randrange(1300, 2400, 50))
         span = (style.depth, reach) if turn == 1 else (full - reach, full - style.depth)
-        runs.append(_Run(other, *span, turn))
+        runs.append(Run(other, *span, turn))
     if len(sides) == 1:
         runs[0] = runs[0]._replace(fridge_at=-side)
     if kind == "galley":
         other = (wall + 2) % 4
         reach = min(length, rng.randrange(1500, 2600, 50))
         start = rng.choice((0, length - reach))
-        runs.append(_Run(other, start, start + reach, 1 if start == 0 else -1))
+        runs.append(Run(other, start, start + reach, 1 if start == 0 else -1))
     return runs
 
 
-def _fill_runs(plan: FloorPlan, style: CabinetStyle, runs: list[_Run]) -> None:
+def fill_runs(plan: FloorPlan, style: CabinetStyle, runs: list[Run]) -> None:
     """Distribute stove, sink and refrigerator over the runs and fill what is between them with worktops."""
     rng = plan.rng
     basin = appliances.sink(rng, 620, 420)
@@ -106,7 +106,7 @@ def _fill_runs(plan: FloorPlan, style: CabinetStyle, runs: list[_Run]) -> None:
         plan.keep_free(plan.wall_spot(run.wall, along).rect(Rect(-half, style.depth, half, style.depth + AISLE)))
 
 
-def _fill(plan: FloorPlan, style: CabinetStyle, run: _Run, models: list[Model], basin: Model) -> None:
+def _fill(plan: FloorPlan, style: CabinetStyle, run: Run, models: list[Model], basin: Model) -> None:
     """Place models along a run, worktops in the gaps, and what belongs above and in them."""
     rng = plan.rng
     spare = run.end - run.start - sum(model.width for model in models)
@@ -132,8 +132,9 @@ def _fill(plan: FloorPlan, style: CabinetStyle, run: _Run, models: list[Model], 
                 plan.at(extractor, spot._replace(height=1620), margin=0)
             if model.category == "Counter":
                 plan.add(basin, appliances.basin_spot(style, basin, spot))
-                view = window(rng, min(model.width, 1000) // 2 * 2, curtains=False)
-                plan.at(view, spot._replace(height=1150))
+                if run.wall in plan.outer:
+                    view = window(rng, min(model.width, 1000) // 2 * 2, curtains=False)
+                    plan.at(view, spot._replace(height=1150))
         along += model.width
 
 

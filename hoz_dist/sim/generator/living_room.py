@@ -17,7 +17,7 @@ def furnish(plan: FloorPlan) -> None:
     """Furnish a living room."""
     rng = plan.rng
     entrance(plan, tuple(plan.any_walls()))
-    _television_corner(plan)
+    television_corner(plan)
     if rng.random() < 0.92:
         dining_set(plan, rng.choice((2, 3, 4, 4, 5)))
     if rng.random() < 0.5 or not plan.has("Chair"):
@@ -45,7 +45,7 @@ def furnish(plan: FloorPlan) -> None:
         free_rug(plan, 1600, 1000)
 
 
-def _television_corner(plan: FloorPlan) -> None:
+def television_corner(plan: FloorPlan) -> None:
     """Place television, sofa and coffee table in one axis, then what stands beside the sofa."""
     rng = plan.rng
     stand, couch = tables.tv_stand(rng), seating.sofa(rng)
@@ -67,13 +67,13 @@ def _television_corner(plan: FloorPlan) -> None:
             if distance > 5200 or not (plan.fits(stand, stand_spot) and plan.fits(couch, couch_spot)):
                 continue
             tv_stand, sofa = plan.add(stand, stand_spot), plan.add(couch, couch_spot)
-            _television(plan, tv_stand)
+            place_television(plan, tv_stand)
             _between(plan, tv_stand, sofa)
             _beside(plan, sofa)
             return
 
 
-def _television(plan: FloorPlan, stand: Placed) -> None:
+def place_television(plan: FloorPlan, stand: Placed) -> None:
     """Put the television on its stand or hang it above."""
     rng = plan.rng
     if rng.random() < 0.95:

@@ -1,12 +1,12 @@
 """Floor, walls, ceiling, and what belongs to the walls: door, light switch, windows, pictures."""
 
+from collections.abc import Iterable, Sequence
 from random import Random
-from typing import Final
+from typing import Final, NamedTuple
 
 from hoz_dist.sim.generator.floor_plan import WALLS, FloorPlan
 from hoz_dist.sim.generator.palette import Colour, paint, shade
 from hoz_dist.sim.generator.solids import Model, Placed, Rect, Solid, Spot, box, vary
-from hoz_dist.sim.room import Item
 
 _THICK: Final = 100
 """Of floor, walls and ceiling."""
@@ -16,13 +16,27 @@ _SWITCH_WIDTH: Final = 130
 _WINDOW_TRIES: Final = 12
 
 
-def shell(plan: FloorPlan, floor: str, *, tiles: int = 0) -> Item:
+class Opening(NamedTuple):
+    """A hole in a wall, from the floor up."""
+
+    wall: int
+    start: int
+    """Where it begins along the wall, see `FloorPlan.wall_spot`."""
+    end: int
+    height: int
+
+
+def shell(
+    plan: FloorPlan, floor: str, *, tiles: int = 0, thick: int = _THICK, openings: Sequence[Opening] = ()
+) -> Placed:
     """Make floor, ceiling and walls, one body around the room's inside.
 
     Args:
         plan: The room.
         floor: Material of the floor.
         tiles: Height to which the walls are tiled, mm.
+        thick: Thickness of floor, walls and ceiling, mm.
+        openings: Ways through the walls.
     """
     rng, width, depth, height = plan.rng, plan.width, plan.depth, plan.height
     wall = paint(rng, "wall")
@@ -30,22 +44,48 @@ def shell(plan: FloorPlan, floor: str, *, tiles: int = 0) -> Item:
     if rng.random() < 0.4:
         walls[rng.choice(WALLS)] = paint(rng, "wall")
     tile = paint(rng, "tile_floor")
-    outside = ((-_THICK, width + _THICK), (-_THICK, depth + _THICK))
+    outside = ((-thick, width + thick), (-thick, depth + thick))
     solids = [
-        box(*outside, (-_THICK, 0), paint(rng, floor)),
-        box(*outside, (height, height + _THICK), paint(rng, "ceiling")),
+        box(*outside, (-thick, 0), paint(rng, floor)),
+        box(*outside, (height, height + thick), paint(rng, "ceiling")),
     ]
     sides = (
-        (outside[0], (-_THICK, 0)),
-        ((-_THICK, 0), (0, depth)),
-        (outside[0], (depth, depth + _THICK)),
-        ((width, width + _THICK), (0, depth)),
+        (outside[0], (-thick, 0)),
+        ((-thick, 0), (0, depth)),
+        (outside[0], (depth, depth + thick)),
+        ((width, width + thick), (0, depth)),
     )
-    for (x, z), colour in zip(sides, walls, strict=True):
-        solids.append(box(x, z, (tiles, height), colour))
+    for number, ((x, z), colour) in enumerate(zip(sides, walls, strict=True)):
+        holes = [_hole(plan, opening, thick) for opening in openings if opening.wall == number]
+        solids += _pierced(box(x, z, (tiles, height), colour), holes)
         if tiles:
-            solids.append(box(x, z, (0, tiles), tile))
-    return Item("Walls", tuple(solid.part() for solid in solids))
+            solids += _pierced(box(x, z, (0, tiles), tile), holes)
+    return Placed.of(Model.of("Walls", solids), Spot(0, 0))
+
+
+def _hole(plan: FloorPlan, opening: Opening, thick: int) -> Solid:
+    """Return the space that an opening takes out of its wall."""
+    rect = plan.wall_spot(opening.wall, 0).rect(Rect(opening.start, -thick, opening.end, 0))
+    return box((rect.x0, rect.x1), (rect.z0, rect.z1), (0, opening.height), (0.0, 0.0, 0.0))
+
+
+def _pierced(wall: Solid, holes: Iterable[Solid]) -> list[Solid]:
+    """Return what holes through the thickness of a wall leave of it: beside them and above."""
+    pieces = [wall]
+    for hole in holes:
+        pieces = [piece for whole in pieces for piece in (_without(whole, hole) if whole.meets(hole) else [whole])]
+    return pieces
+
+
+def _without(wall: Solid, hole: Solid) -> list[Solid]:
+    along_x = wall.x[1] - wall.x[0] > wall.z[1] - wall.z[0]
+    span, gap = (wall.x, hole.x) if along_x else (wall.z, hole.z)
+    sides = [(span[0], gap[0]), (gap[1], span[1])]
+    pieces = [wall._replace(x=side) if along_x else wall._replace(z=side) for side in sides if side[0] < side[1]]
+    if hole.h[1] < wall.h[1]:
+        above = wall._replace(h=(hole.h[1], wall.h[1]))
+        pieces.append(above._replace(x=gap) if along_x else above._replace(z=gap))
+    return pieces
 
 
 def entrance(plan: FloorPlan, walls: tuple[int, ...]) -> None:
@@ -137,11 +177,11 @@ def window(rng: Random, width: int, *, curtains: bool) -> Model:
 
 
 def windows(plan: FloorPlan, count: int, *, curtains: bool) -> None:
-    """Place windows wherever a wall is free at their height, furniture below or not."""
+    """Place windows wherever an outer wall is free at their height, furniture below or not."""
     rng = plan.rng
     for _ in range(count):
         model = window(rng, vary(rng, 1100, 25), curtains=curtains)
-        _on_wall(plan, model, rng.randint(950, 1050))
+        _on_wall(plan, model, plan.outer, rng.randint(950, 1050))
 
 
 def pictures(plan: FloorPlan, count: int) -> None:
@@ -158,13 +198,13 @@ def pictures(plan: FloorPlan, count: int) -> None:
                 box((-half // 2, half // 3), (24, 26), (height // 4, height // 2), paint(rng, "picture")),
             ],
         )
-        _on_wall(plan, model, rng.randint(1250, 1450))
+        _on_wall(plan, model, WALLS, rng.randint(1250, 1450))
 
 
-def _on_wall(plan: FloorPlan, model: Model, height: int) -> Placed | None:
+def _on_wall(plan: FloorPlan, model: Model, walls: Sequence[int], height: int) -> Placed | None:
     rng = plan.rng
     for _ in range(_WINDOW_TRIES):
-        wall = rng.choice(WALLS)
+        wall = rng.choice(walls)
         edge = model.width // 2 + 60
         if 2 * edge >= plan.wall_length(wall):
             continue

@@ -4,6 +4,7 @@ from dataclasses import replace
 import torch
 
 from hoz_dist.a3c.loss import LossWeights, a3c_loss
+from hoz_dist.policy.steering import Imitation
 from tests.unit.a3c.making import make_rollout
 
 WEIGHTS = LossWeights(discount=0.9, gae_lambda=0.95, value=0.0, entropy=0.0, scene=0.0)
@@ -59,3 +60,28 @@ def test_scene_labels_train_the_scene_layer() -> None:
     a3c_loss(*arguments).total.backward()  # type: ignore[no-untyped-call]
     assert scene_logits.grad is not None
     assert (scene_logits.grad[..., 3] < 0).all()
+
+
+def test_imitation_moves_what_counts_to_the_experts_action_and_nothing_else() -> None:
+    """Not where the step only reset, where no path leads to the target, or where the steering does not ask for it."""
+    rollout = make_rollout(steps=2, batch=4, seed=5, ends=False)
+    rollout.valid[0, 1] = False
+    expert = torch.tensor([[3, 3, -1, 3], [5, 0, 1, 2]])
+    counts = torch.tensor([[True, True, True, False], [True, True, True, True]])
+    imitated = torch.zeros(2, 4, 2, 6, requires_grad=True)  # two policies
+    arguments = (replace(rollout, expert=expert), torch.zeros(2, 4, 6), torch.zeros(2, 4))
+    loss = a3c_loss(*arguments, WEIGHTS._replace(imitation=2.0), imitation=Imitation(imitated, counts))
+    loss.total.backward()  # type: ignore[no-untyped-call]
+    assert math.isclose(loss.imitation, 2 * 5 * math.log(6) / 7, rel_tol=1e-5)
+    assert imitated.grad is not None
+    assert imitated.grad[0, 1:].abs().max() == 0.0
+    for t, b in ((0, 0), (1, 0), (1, 1), (1, 2), (1, 3)):
+        assert (imitated.grad[t, b].argmin(dim=-1) == expert[t, b]).all()
+    torch.testing.assert_close(imitated.grad[0, 0, :, 3], torch.full((2,), 2.0 * (1 / 6 - 1) / 7))
+
+
+def test_without_the_experts_actions_nothing_is_imitated() -> None:
+    rollout = make_rollout(steps=2, batch=4, seed=5)
+    imitation = Imitation(torch.zeros(2, 4, 1, 6, requires_grad=True), torch.ones(2, 4, dtype=torch.bool))
+    arguments = (rollout, torch.zeros(2, 4, 6), torch.zeros(2, 4), WEIGHTS._replace(imitation=1.0))
+    assert a3c_loss(*arguments, imitation=imitation).imitation == 0.0

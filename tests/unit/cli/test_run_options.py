@@ -8,6 +8,7 @@ from click.testing import CliRunner
 from hoz_dist.cli.main import run
 from hoz_dist.cli.run_options import as_arguments, run_config, run_options
 from hoz_dist.config import RunConfig
+from hoz_dist.policy.relations import SHIPPED, shipped_relations
 
 
 def choices_of(*words: str) -> dict[str, Any]:
@@ -47,6 +48,15 @@ def test_options_come_back_from_the_words_that_they_are_written_as() -> None:
     assert as_arguments({"weights": Path("a b"), "cache": None}) == ["--weights", "a b"]
 
 
+def test_relations_of_a_file_become_part_of_the_configuration(tmp_path: Path) -> None:
+    path = tmp_path / "relations.json"
+    path.write_text('[["Plate", "near", "Bowl", 3]]')
+    choices = choices_of("--model", "sp", "--relations", str(path))
+    assert run_config(choices).relations == ("Bowl+Plate",)
+    assert choices_of(*as_arguments(choices)) == choices
+    assert run_config(choices_of("--model", "sp")).relations == shipped_relations()
+
+
 @pytest.mark.parametrize(
     ("options", "words"),
     [
@@ -54,6 +64,8 @@ def test_options_come_back_from_the_words_that_they_are_written_as() -> None:
         (["--zones", "1"], "'zones' is 1"),
         (["--minutes", "1", "--frames", "2"], "either minutes or frames"),
         (["--encoder", "resnet18"], "--weights"),
+        (["--model", "sp", "--relations", "none.json"], "none.json"),
+        (["--relations", str(SHIPPED)], "take 'sp'"),
     ],
 )
 def test_a_wrong_option_is_said_in_one_sentence(

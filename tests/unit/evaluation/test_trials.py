@@ -4,7 +4,6 @@ from numpy.typing import NDArray
 
 from hoz_dist.evaluation.agents import OracleAgent, RandomAgent
 from hoz_dist.evaluation.benchmark import Benchmark
-from hoz_dist.evaluation.trials import trace_episodes
 from hoz_dist.nav.actions import Action
 from hoz_dist.nav.metrics import long_episodes
 from hoz_dist.nav.rooms import RoomId
@@ -67,12 +66,3 @@ def test_spread_over_trials_is_the_sample_standard_deviation(benchmark: Benchmar
     figures = evaluation.to_json()["all"]["sr"]
     assert figures["mean"] == pytest.approx(np.mean(rates), abs=0.01)
     assert figures["std"] == pytest.approx(np.std(rates, ddof=1), abs=0.01)
-
-
-def test_trajectories_lead_from_the_start_to_a_success(benchmark: Benchmark) -> None:
-    episodes = benchmark.episodes[:5]
-    results, ways = trace_episodes(OracleAgent(list(ROOMS)), ROOMS, episodes, seed=0)
-    for episode, result, way in zip(episodes, results, ways, strict=True):
-        assert way[0] == episode.start
-        assert len(way) == result.actions + 1
-        assert ROOMS[0].success[way[-1], episode.target]

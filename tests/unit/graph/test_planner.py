@@ -14,6 +14,7 @@ from hoz_dist.graph.planner import (
     normalized_adjacency,
     plan,
     plan_for,
+    subgoals,
     target_zone,
 )
 from tests.unit.graph.exhaustive import best_path, product_of
@@ -143,3 +144,12 @@ def test_normalized_adjacency_is_the_matrix_product() -> None:
     np.testing.assert_allclose(normalized_adjacency(edges), expected)
     np.testing.assert_allclose(normalized_adjacency(np.stack([edges, np.eye(8)])), np.stack([expected, np.eye(8)]))
     assert np.abs(np.linalg.eigvalsh(expected)).max() == pytest.approx(1.0)
+
+
+def test_the_subgoal_is_on_the_path_or_the_target_zone_or_any() -> None:
+    edges = random_edges(6, np.random.default_rng(4))
+    np.testing.assert_array_equal(subgoals(edges, "normalized", "path"), next_hops(edges, "normalized"))
+    np.testing.assert_array_equal(subgoals(edges, "normalized", "target")[2], np.arange(6))
+    drawn = subgoals(edges, "normalized", "random")
+    np.testing.assert_array_equal(drawn, subgoals(random_edges(6, np.random.default_rng(5)), "product", "random"))
+    assert set(drawn.ravel().tolist()) == set(range(6))

@@ -1,3 +1,5 @@
+from typing import get_args
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -5,7 +7,7 @@ from hypothesis import strategies as st
 
 from hoz_dist.errors import InvalidValueError
 from hoz_dist.graph.views import Views
-from hoz_dist.graph.zones import cluster
+from hoz_dist.graph.zones import Clustering, cluster
 from tests.unit.graph.samples import random_bags
 
 
@@ -83,3 +85,36 @@ def test_number_of_zones_out_of_range_is_refused(zones: int) -> None:
 def test_fewer_views_than_zones_are_refused() -> None:
     with pytest.raises(InvalidValueError, match="5 views cannot have 8 zones; use at most 5"):
         cluster(some_views(5, 5), 8, 0)
+
+
+CLUSTERINGS: list[Clustering] = list(get_args(Clustering))
+
+
+@pytest.mark.parametrize("clustering", CLUSTERINGS)
+@pytest.mark.parametrize(("count", "distinct", "zones"), [(400, 60, 8), (40, 3, 8), (30, 9, 8)])
+def test_every_clustering_gives_k_zones_and_the_same_again(
+    clustering: Clustering, count: int, distinct: int, zones: int
+) -> None:
+    views = some_views(count, distinct)
+    labels = cluster(views, zones, 3, clustering)
+    assert sorted(set(labels.tolist())) == list(range(zones))
+    np.testing.assert_array_equal(labels, cluster(views, zones, 3, clustering))
+
+
+@pytest.mark.parametrize("clustering", ["spectral", "agglomerative"])
+def test_other_clusterings_find_clear_clusters_too(clustering: Clustering) -> None:
+    truth = np.repeat(np.arange(4), 25)
+    bags = np.zeros((100, 22), dtype=np.bool_)
+    for zone in range(4):
+        bags[truth == zone, zone * 5 : zone * 5 + 5] = True
+    bags[np.arange(100), np.random.default_rng(0).integers(0, 20, 100)] ^= True
+    labels = cluster(Views(bags, np.zeros((100, 2), dtype=np.int16)), 4, 0, clustering)
+    assert len({(int(a), int(b)) for a, b in zip(truth, labels, strict=True)}) == 4
+
+
+def test_zones_of_positions_are_places_whatever_is_seen_there() -> None:
+    positions = np.repeat(np.array([[0, 0], [1, 0], [20, 20], [21, 20]], dtype=np.int16), 16, axis=0)
+    bags = random_bags(64, np.random.default_rng(0))
+    labels = cluster(Views(bags, positions), 2, 0, "positions")
+    assert len(set(labels[:32].tolist())) == len(set(labels[32:].tolist())) == 1
+    assert labels[0] != labels[32]

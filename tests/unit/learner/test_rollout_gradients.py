@@ -9,13 +9,14 @@ import pytest
 from hoz_dist.config import RunConfig
 from hoz_dist.gradient_forms import Vector
 from hoz_dist.nav.observation import Observation
+from hoz_dist.policy.methods.description import Method
 from hoz_dist.policy.parameters import initial_parameters
-from hoz_dist.policy.settings import Method
 from hoz_dist.wire.protocol.codec import decode, encode
 from hoz_dist.wire.protocol.rejection import Reason, RejectedError
 from hoz_dist.wire.protocol.trajectories import Flag, GraphUsed, RoomUsed, TrajectoryPush
 from learner.optimizer import FlatAdam
 from learner.rollout_gradients import RolloutGradients
+from tests.unit.policy.steering import CountingSteering, steer_a3c
 from tests.unit.workers.making import BEDROOM, CONFIG, KITCHEN, make_collector, room_views, scene_graph
 from workers.collector import Collector, Trajectory
 
@@ -81,7 +82,7 @@ def test_what_the_actor_saw_is_seen_again(monkeypatch: pytest.MonkeyPatch) -> No
     assert set(np.unique(again[-1].scene)) == {0, 2}
 
 
-@pytest.mark.parametrize("method", ["a3c", "hoz"])
+@pytest.mark.parametrize("method", ["a3c", "hoz", "savn", "org-tpn"])
 def test_without_lag_the_gradients_are_the_actors_own(method: Method) -> None:
     """Over several rollouts: what one ends with, the next begins with, though it never travels."""
     config = dataclasses.replace(CONFIG, method=method)
@@ -98,6 +99,24 @@ def test_without_lag_the_gradients_are_the_actors_own(method: Method) -> None:
         assert learnt.loss.terms() == pytest.approx(update.loss.terms(), abs=1e-4)
         assert_close(learnt.gradient, update.gradient)
         adam.step(update.gradient)  # the same for all, since Adam makes much of rounding
+
+
+def test_the_learner_knows_the_experts_actions_and_the_steerings_memory(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Neither travels: the one follows from the rooms, the other from the rollout before."""
+    steer_a3c(monkeypatch, CountingSteering)
+    config = dataclasses.replace(CONFIG, method="a3c")
+    gradients, adam = learner_of(config)
+    differentiating, recording = (make_collector(config, *ROOMS, max_actions=LONG) for _ in range(2))
+    for sequence in range(3):
+        for collector in (differentiating, recording):
+            collector.parameters.load(adam.parameters)
+        update, trajectory = differentiating.roll_out(), recording.record()
+        learnt = gradients.learn(push_of(trajectory, sequence, ()))
+        assert learnt.loss is not None
+        assert learnt.loss.imitation == pytest.approx(update.loss.imitation, abs=1e-4)
+        assert update.loss.imitation > 0.1
+        assert_close(learnt.gradient, update.gradient)
+        adam.step(update.gradient)
 
 
 def test_of_an_unknown_state_nothing_is_learnt_until_the_next_episode_begins() -> None:

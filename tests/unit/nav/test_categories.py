@@ -3,7 +3,15 @@ import hashlib
 import pytest
 
 from hoz_dist.errors import UnknownNameError
-from hoz_dist.nav.categories import SCENE_TARGETS, SCENES, TARGETS, category_index, scene_index
+from hoz_dist.nav.categories import (
+    ROOM_SCENES,
+    SCENE_TARGETS,
+    SCENES,
+    TARGETS,
+    category_index,
+    scene_index,
+    scenes_to_tell,
+)
 
 
 def test_targets_keep_the_order_of_the_released_graphs() -> None:
@@ -14,8 +22,11 @@ def test_targets_keep_the_order_of_the_released_graphs() -> None:
 
 
 def test_scenes_and_their_targets_are_the_released_protocols() -> None:
-    assert SCENES == ("kitchen", "living_room", "bedroom", "bathroom")
-    assert [len(SCENE_TARGETS[scene]) for scene in SCENES] == [14, 10, 8, 3]
+    assert ROOM_SCENES == ("kitchen", "living_room", "bedroom", "bathroom")
+    # Saved scene layers and messages number the scenes: new ones come last.
+    assert SCENES[-1] == "apartment"
+    assert SCENES[:-1] == ROOM_SCENES
+    assert [len(SCENE_TARGETS[scene]) for scene in SCENES] == [14, 10, 8, 3, 12]
 
 
 @pytest.mark.parametrize("scene", SCENES)
@@ -38,7 +49,12 @@ def test_unknown_category_names_the_nearest_and_all_known() -> None:
 
 
 def test_scene_index_is_the_place_in_the_order() -> None:
-    assert [scene_index(scene) for scene in SCENES] == [0, 1, 2, 3]
+    assert [scene_index(scene) for scene in SCENES] == [0, 1, 2, 3, 4]
+
+
+def test_a_scene_layer_needs_an_output_for_apartments_in_apartments_only() -> None:
+    assert scenes_to_tell(["kitchen"]) == scenes_to_tell(ROOM_SCENES) == 4
+    assert scenes_to_tell(["apartment"]) == scenes_to_tell(SCENES) == 5
 
 
 def test_unknown_scene_is_refused_with_the_known_ones() -> None:

@@ -1,14 +1,16 @@
 import pytest
 
 from hoz_dist.errors import HozError, InvalidValueError, UnknownNameError
-from hoz_dist.nav.categories import SCENES
+from hoz_dist.nav.categories import ROOM_SCENES, SCENES
 from hoz_dist.nav.rooms import SPLITS, RoomId, rooms_of, training_rooms
 
 
-def test_splits_share_no_room_and_cover_1_to_30() -> None:
-    numbers = [number for split in SPLITS.values() for number in split]
-    assert numbers == list(range(1, 31))
-    assert [len(SPLITS[split]) for split in ("train", "val", "test")] == [20, 5, 5]
+@pytest.mark.parametrize("scene", SCENES)
+def test_splits_share_no_room_and_cover_all(scene: str) -> None:
+    numbers = [number for split in SPLITS[scene].values() for number in split]
+    sizes = [60, 5, 10] if scene == "apartment" else [20, 5, 5]
+    assert numbers == list(range(1, sum(sizes) + 1))
+    assert [len(SPLITS[scene][split]) for split in ("train", "val", "test")] == sizes
 
 
 @pytest.mark.parametrize(
@@ -20,6 +22,9 @@ def test_splits_share_no_room_and_cover_1_to_30() -> None:
         ("bedroom/25", "val"),
         ("living_room/26", "test"),
         ("living_room/30", "test"),
+        ("apartment/60", "train"),
+        ("apartment/61", "val"),
+        ("apartment/75", "test"),
     ],
 )
 def test_room_names_read_back_and_know_their_split(name: str, split: str) -> None:
@@ -36,6 +41,7 @@ def test_room_names_read_back_and_know_their_split(name: str, split: str) -> Non
         "kitchen/",
         "kitchen/0",
         "kitchen/31",
+        "apartment/76",
         "kitchen/-1",
         "kitchen/x",
         "kitchen/1/2",
@@ -63,10 +69,13 @@ def test_training_rooms_are_ordered_and_each_comes_once() -> None:
     rooms = training_rooms(("bathroom/3", "kitchen/2", "kitchen/10", "bathroom/3"))
     assert [str(room) for room in rooms] == ["kitchen/2", "kitchen/10", "bathroom/3"]
     assert len(training_rooms(("kitchen", "kitchen/3"))) == 20
-    assert len(training_rooms(SCENES)) == 80
+    assert len(training_rooms(ROOM_SCENES)) == 80
+    assert len(training_rooms(SCENES)) == 140
 
 
-@pytest.mark.parametrize(("room", "kept"), [("kitchen/25", "validation"), ("bedroom/26", "test")])
+@pytest.mark.parametrize(
+    ("room", "kept"), [("kitchen/25", "validation"), ("bedroom/26", "test"), ("apartment/61", "validation")]
+)
 def test_training_refuses_rooms_kept_for_validation_and_test(room: str, kept: str) -> None:
     with pytest.raises(InvalidValueError, match=f"{room} is kept for {kept}"):
         training_rooms(("kitchen/1", room))

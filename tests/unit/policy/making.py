@@ -5,7 +5,7 @@ import numpy as np
 from hoz_dist.graph.room_graph import RoomGraph
 from hoz_dist.graph.scene_graph import SceneGraph, merge_rooms
 from hoz_dist.nav.actions import NO_ACTION
-from hoz_dist.nav.categories import SCENES, TARGETS
+from hoz_dist.nav.categories import ROOM_SCENES, SCENES, TARGETS
 from hoz_dist.nav.observation import Observation
 
 CHANNELS = 6
@@ -29,7 +29,7 @@ def make_observation(*shape: int, seed: int = 0) -> Observation:
         ),
         target=rng.integers(categories, size=shape),
         previous_action=rng.integers(NO_ACTION + 1, size=shape),
-        scene=rng.integers(len(SCENES), size=shape),
+        scene=rng.integers(len(ROOM_SCENES), size=shape),
         first=first,
     )
 

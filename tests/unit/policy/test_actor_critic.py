@@ -8,9 +8,11 @@ from hoz_dist.config import RunConfig
 from hoz_dist.nav.observation import Observation
 from hoz_dist.policy.actor_critic import ActorCritic, Decision, State
 from hoz_dist.policy.graph_bank import GraphBank
+from hoz_dist.policy.methods import METHODS
+from hoz_dist.policy.methods.description import Layer, Method
 from hoz_dist.policy.navigator import Guidance
 from hoz_dist.policy.parameters import FlatParameters, initial_parameters, make_policy
-from hoz_dist.policy.settings import Layer, Method, Precision, Preset
+from hoz_dist.policy.settings import Precision, Preset
 from hoz_dist.policy.tape import dtype_of
 from tests.unit.policy.making import make_observation, make_scene_graph, step_of
 
@@ -33,16 +35,29 @@ def act_over(policy: ActorCritic, observation: Observation, state: State, bank: 
     return decisions
 
 
-LAYERS = get_args(Layer)
+LAYERS = METHODS["hoz"].layers
 
 
 @pytest.mark.parametrize("preset", ["compact", "paper"])
 @pytest.mark.parametrize("without", [combination for n in range(5) for combination in combinations(LAYERS, n)])
 def test_unrolling_says_what_acting_said(without: tuple[Layer, ...], preset: Preset, bank: GraphBank) -> None:
-    """With every combination of layers, from a state in the middle of episodes."""
-    policy = make_policy(RunConfig(without=without, preset=preset).policy, 0)
+    """With every combination of the layers of `hoz`."""
+    check_unrolling(RunConfig(without=without, preset=preset), bank)
+
+
+@pytest.mark.parametrize("preset", ["compact", "paper"])
+@pytest.mark.parametrize("method", [name for name in METHODS if name != "hoz"])
+def test_unrolling_says_what_acting_said_with_every_method(method: Method, preset: Preset, bank: GraphBank) -> None:
+    check_unrolling(RunConfig(method=method, preset=preset), bank)
+
+
+def check_unrolling(config: RunConfig, bank: GraphBank) -> None:
+    """Compare acting with unrolling, from a state in the middle of episodes, some of which come back to views."""
+    policy = make_policy(config.policy, 0)
     before, observation = make_observation(3, BATCH, seed=1), make_observation(STEPS, BATCH)
     observation.first[0] = False
+    observation.first[:, :2] = False
+    observation.features[0], observation.features[4:7] = before.features[1], observation.features[1:4]
     start = act_over(policy, before, policy.initial_state(BATCH), bank)[-1].state
     decisions = act_over(policy, observation, start, bank)
     guidance = Guidance(*map(torch.stack, zip(*(decision.guidance for decision in decisions), strict=True)))
@@ -50,11 +65,14 @@ def test_unrolling_says_what_acting_said(without: tuple[Layer, ...], preset: Pre
         unrolled = policy.unroll(observation, start, guidance, bank)
     torch.testing.assert_close(unrolled.logits, torch.stack([d.logits for d in decisions]), atol=1e-5, rtol=1e-4)
     torch.testing.assert_close(unrolled.values, torch.stack([d.value for d in decisions]), atol=1e-5, rtol=1e-4)
-    assert (unrolled.scene_logits is not None) == ("scene" not in without)
+    assert (unrolled.scene_logits is not None) == config.policy.scene_layer
     after = decisions[-1].state
     torch.testing.assert_close(unrolled.state.lstm, after.lstm, atol=1e-5, rtol=1e-4)
     torch.testing.assert_close(unrolled.state.zone.nodes, after.zone.nodes)
     assert torch.equal(unrolled.state.zone.scene, after.zone.scene)
+    assert len(unrolled.state.memory) == len(after.memory)
+    for mine, theirs in zip(unrolled.state.memory, after.memory, strict=True):
+        torch.testing.assert_close(mine, theirs, atol=1e-5, rtol=1e-4)
 
 
 @pytest.mark.skipif(dtype_of("bf16") != torch.bfloat16, reason="the processor has no products of bf16")
@@ -115,16 +133,20 @@ def test_the_state_before_a_rollout_matters(bank: GraphBank) -> None:
 def unroll_once(policy: ActorCritic, bank: GraphBank) -> None:
     """Act and go back over it, so that every parameter has its gradient."""
     observation, start = make_observation(STEPS, BATCH), policy.initial_state(BATCH)
+    observation.first[1:, :2] = False  # long enough to adapt
+    observation.features[4:7] = observation.features[1:4]
     guidances = [decision.guidance for decision in act_over(policy, observation, start, bank)]
     guidance = Guidance(*map(torch.stack, zip(*guidances, strict=True)))
     unrolled = policy.unroll(observation, start, guidance, bank)
     loss = unrolled.logits.square().sum() + unrolled.values.sum()
     if unrolled.scene_logits is not None:
         loss = loss + unrolled.scene_logits.square().sum()
+    if unrolled.imitation is not None:
+        loss = loss + (unrolled.imitation.logits.square().sum(dim=(2, 3)) * unrolled.imitation.counts).sum()
     loss.backward()  # type: ignore[no-untyped-call]
 
 
-@pytest.mark.parametrize("method", ["a3c", "object", "hoz"])
+@pytest.mark.parametrize("method", METHODS)
 def test_the_gradient_reaches_every_parameter(method: Method, bank: GraphBank) -> None:
     """In the released code it does not reach lambda."""
     policy = make_policy(RunConfig(method=method).policy, 0)

@@ -1,0 +1,130 @@
+"""`hoz-dist analyse`: why episodes of runs fail, where SPL is lost, and what the graph did."""
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from hoz_dist.cli.options import cache_option, weights_option
+from hoz_dist.nav.categories import SCENES
+
+if TYPE_CHECKING:
+    from hoz_dist.cli.trace_runs import TracedRuns
+    from hoz_dist.evaluation.analysis import Analysis
+    from hoz_dist.evaluation.learning_curve import LearningCurve
+
+
+@click.command("analyse")
+@click.argument("runs", metavar="RUN...", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.option("--split", type=click.Choice(["val", "test"]), default="val", show_default=True, help="Rooms to use.")
+@click.option(
+    "--trials", type=click.IntRange(1, 100), default=1, show_default=True, help="Trials; each draws its own actions."
+)
+@click.option(
+    "--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of the first trial; the next adds 1."
+)
+@click.option(
+    "--episodes", type=click.IntRange(1, 100_000), default=400, show_default=True, help="Episodes in each scene."
+)
+@click.option(
+    "--scene",
+    "scenes",
+    multiple=True,
+    help=f"Scene to evaluate in: {', '.join(SCENES)}; may be repeated.  [default: those that it was trained in]",
+)
+@click.option("--long", "only_long", is_flag=True, help="Show the episodes with L* >= 5 alone in the table.")
+@click.option(
+    "--curve", is_flag=True, help="Also measure each checkpoint that a run folder keeps, for frames to SR 50 and 70."
+)
+@click.option("--out", type=click.Path(file_okay=False, path_type=Path), help="Folder for pictures and analysis.json.")
+@weights_option
+@cache_option
+@click.option("--json", "as_json", is_flag=True, help="Print JSON, all episodes and the long ones, instead of a table.")
+def analyse_command(
+    runs: tuple[Path, ...],
+    split: str,
+    trials: int,
+    seed: int,
+    episodes: int,
+    scenes: tuple[str, ...],
+    out: Path | None,
+    weights: Path | None,
+    cache: Path | None,
+    *,
+    only_long: bool,
+    curve: bool,
+    as_json: bool,
+) -> None:
+    """Say why episodes of each RUN fail, where SPL is lost, and what the graph did.
+
+    RUN is a run folder or a checkpoint file. Runs that differ by their seed alone count as one method. All of them, and
+    Random and Oracle beside them, run the same fixed episodes. docs/analysis.md explains each figure.
+    """
+    from rich.console import Console
+
+    from hoz_dist.cli.trace_runs import open_runs, trace_runs
+    from hoz_dist.evaluation.analysis_table import analysis_table
+
+    opened = open_runs(
+        runs,
+        split="test" if split == "test" else "val",
+        episodes=episodes,
+        scenes=scenes,
+        weights=weights,
+        cache=cache,
+        with_kept=curve,
+    )
+    traced = trace_runs(opened, range(seed, seed + trials))
+    results = _results(traced, split)
+    if out is not None:
+        _draw(traced, out, results)
+    if as_json:
+        click.echo(json.dumps(results, indent=2))
+        return
+    shown = [analysis.long if only_long else analysis for analysis in traced.analyses]
+    table = analysis_table(
+        [analysis for analysis in shown if analysis is not None],
+        traced.curves,
+        title=f"{len(traced.benchmark.episodes)} episodes on unseen {'validation' if split == 'val' else 'test'} rooms"
+        + (", those with L* >= 5" if only_long else ""),
+        caption="docs/analysis.md explains each figure",
+    )
+    Console().print(table)
+
+
+def _results(traced: "TracedRuns", split: str) -> dict[str, Any]:
+    def parts(analysis: "Analysis") -> dict[str, Any]:
+        return {"all": analysis.to_json(), "long": None if analysis.long is None else analysis.long.to_json()}
+
+    return {
+        "split": split,
+        "methods": {analysis.name: parts(analysis) for analysis in traced.analyses},
+        "curves": {name: [_curve(curve) for curve in curves] for name, curves in traced.curves.items()},
+    }
+
+
+def _curve(curve: "LearningCurve") -> dict[str, Any]:
+    from hoz_dist.evaluation.analysis_table import MILESTONES
+    from hoz_dist.evaluation.learning_curve import frames_to
+
+    return {**curve._asdict(), "frames_to": {f"{rate:.0f}": frames_to(curve, rate) for rate in MILESTONES}}
+
+
+def _draw(traced: "TracedRuns", folder: Path, results: Mapping[str, Any]) -> None:
+    from hoz_dist.atomic import replace_file, write_atomically
+    from hoz_dist.viz.analysis import failure_figure, learning_figure, length_figure
+    from hoz_dist.viz.trajectory import draw_trajectories
+    from hoz_dist.viz.zones import png
+
+    folder.mkdir(parents=True, exist_ok=True)
+    figures = {"failures": failure_figure(traced.methods), "success-by-length": length_figure(traced.methods)}
+    if traced.curves:
+        figures["learning-curves"] = learning_figure(traced.curves)
+    for name, figure in figures.items():
+        write_atomically(folder / f"{name}.png", png(figure), overwrite=True)
+    ways = traced.side_by_side()
+    columns = len(traced.shown)
+    replace_file(folder / "trajectories.png", lambda temporary: draw_trajectories(ways, temporary, columns))
+    write_atomically(folder / "analysis.json", f"{json.dumps(results, indent=2)}\n".encode(), overwrite=True)

@@ -1,0 +1,227 @@
+"""`hoz-dist reproduce`: train, test and compare what a table of the paper compares."""
+
+import os
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import click
+
+from hoz_dist.cli.options import cache_option, echo_json, json_option
+from hoz_dist.errors import InvalidValueError, UnknownNameError
+
+if TYPE_CHECKING:
+    from hoz_dist.reproduce.budget import Budget
+    from hoz_dist.reproduce.job import Job
+    from hoz_dist.reproduce.row import Table
+
+SESSIONS_FILE: Final = "sessions.json"
+"""What each start of the command was expected to take, and took; None for one that was stopped."""
+
+
+@click.command("reproduce")
+@click.argument("table", required=False)
+@click.option("--budget", default="quick", show_default=True, help="What every row gets: quick, standard or full.")
+@click.option(
+    "--jobs", type=click.IntRange(1, 256), help="Runs at once, each a learner and an actor.  [default: number of cores]"
+)
+@click.option(
+    "--out",
+    type=click.Path(file_okay=False, path_type=Path),
+    default=Path("runs/reproduce"),
+    show_default=True,
+    help="Folder of runs and results; what it holds is not done again, whichever table it was for.",
+)
+@click.option("--seeds", type=click.IntRange(1, 100), help="Training runs of each row.  [default: as the budget says]")
+@click.option("--row", "rows", multiple=True, help="Train this row only; may be repeated.  [default: all]")
+@click.option("--estimate", is_flag=True, help="Only say how long it would take.")
+@click.option("--collect", is_flag=True, help="Only show what is finished.")
+@click.option(
+    "--docs",
+    type=click.Path(file_okay=False, path_type=Path),
+    help="Put Markdown, JSON and picture of the table into this folder, too.",
+)
+@cache_option
+@json_option
+def reproduce_command(
+    table: str | None,
+    budget: str,
+    jobs: int | None,
+    out: Path,
+    seeds: int | None,
+    rows: tuple[str, ...],
+    docs: Path | None,
+    cache: Path | None,
+    *,
+    estimate: bool,
+    collect: bool,
+    as_json: bool,
+) -> None:
+    """Make TABLE of the paper again: train what is missing, test it on unseen rooms, compare with intervals.
+
+    Without TABLE, list the tables. It first says how long it takes. Ctrl-C or a kill loses nothing that is finished,
+    and at most half a minute of the rest; the same command goes on.
+    """
+    from hoz_dist.reproduce.budget import BUDGETS
+    from hoz_dist.reproduce.job import jobs_of
+    from hoz_dist.reproduce.tables import TABLES
+
+    if budget not in BUDGETS:
+        raise UnknownNameError.of("budget", budget, BUDGETS)
+    if table is None:
+        _list_tables(list(TABLES.values()), BUDGETS[budget], as_json=as_json)
+        return
+    if table not in TABLES:
+        raise UnknownNameError.of("table", table, TABLES)
+    wanted, spend = TABLES[table], BUDGETS[budget]
+    for name in rows:
+        if name not in {row.name for row in wanted.rows}:
+            raise UnknownNameError.of("row", name, [row.name for row in wanted.rows])
+    if rows and collect:
+        message = "--row chooses what is trained and --collect trains nothing; leave out one of them."
+        raise InvalidValueError(message)
+    of_rows = {row.name: jobs_of(wanted, row, spend, None if seeds is None else range(seeds)) for row in wanted.rows}
+    command = f"hoz-dist reproduce {table} --budget {budget}" + (f" --seeds {seeds}" if seeds else "")
+    chosen = [job for name, jobs_of_row in of_rows.items() if not rows or name in rows for job in jobs_of_row]
+    if not collect:
+        with _alone(out):
+            processes = jobs or len(os.sched_getaffinity(0))
+            finished = work_off(table, chosen, out, cache, processes, only_estimate=estimate, as_json=as_json)
+        if not finished:
+            return
+    _show(wanted, spend, command, of_rows, out, docs, as_json=as_json)
+
+
+def work_off(
+    table: str,
+    jobs: "Sequence[Job]",
+    out: Path,
+    cache: Path | None,
+    processes: int,
+    *,
+    only_estimate: bool,
+    as_json: bool,
+) -> bool:
+    """Say how long jobs take, then do them.
+
+    Args:
+        table: Name of the table that they are for.
+        jobs: What is to do; finished ones are passed over.
+        out: Folder of runs and results.
+        cache: The view cache; the default one when None.
+        processes: Runs at once.
+        only_estimate: Do nothing but the measurement.
+        as_json: Print the estimate as JSON, when it is all that is wanted.
+
+    Returns:
+        Whether the jobs are done.
+
+    Raises:
+        HozError: Something failed; what is finished is kept.
+    """
+    from hoz_dist.cli.progress import duration
+    from hoz_dist.cli.reproduce_costs import measure_costs, missing_rooms, render, rooms_needed
+    from hoz_dist.cli.reproduce_crew import run_tasks, seconds_left
+    from hoz_dist.cli.reproduce_results import note_session, read_sessions
+    from hoz_dist.cli.reproduce_task import Place
+    from hoz_dist.reproduce.costs import makespan
+    from hoz_dist.reproduce.job import tasks_of
+    from hoz_dist.sim.view_store import default_cache
+
+    place, began = Place(out, cache or default_cache()), time.monotonic()
+    tasks = [task for task in tasks_of(jobs, out) if task.waiting(out)]
+    if not tasks:
+        if only_estimate:
+            echo_json({"seconds": 0.0, "runs": 0}) if as_json else click.echo("Everything is finished.")
+        return not only_estimate
+    picture_size = tasks[0].jobs[0].test_config.picture_size
+    costs = measure_costs(tasks, place.cache, picture_size, min(processes, len(tasks)))
+    seconds = costs.render_seconds + makespan(seconds_left(tasks, place, costs), processes)
+    if only_estimate and as_json:
+        echo_json({"seconds": round(seconds), "runs": len(tasks), "costs": costs.to_json()})
+    else:
+        click.echo(f"{len(tasks)} runs, {processes} at once, take about {duration(seconds)}.", err=not only_estimate)
+    if only_estimate:
+        return False
+    session: dict[str, Any] = {
+        "table": table,
+        "runs": len(tasks),
+        "jobs": processes,
+        "measuring_seconds": round(time.monotonic() - began, 1),
+        "estimated_seconds": round(seconds, 1),
+        "costs": costs.to_json(),
+        "took_seconds": None,
+    }
+    log = out / SESSIONS_FILE
+    before = read_sessions(log)
+    note_session(log, [*before, session])
+    began = time.monotonic()
+    render(missing_rooms(rooms_needed(tasks), place.cache, picture_size), place.cache, picture_size)
+    run_tasks(tasks, place, processes, costs)
+    session["took_seconds"] = round(time.monotonic() - began, 1)
+    note_session(log, [*before, session])
+    click.echo(f"Took {duration(session['took_seconds'])}; {duration(seconds)} were expected.", err=True)
+    return True
+
+
+def _show(
+    table: "Table",
+    budget: "Budget",
+    command: str,
+    jobs: "Mapping[str, Sequence[Job]]",
+    out: Path,
+    docs: Path | None,
+    *,
+    as_json: bool,
+) -> None:
+    """Write the table's files, and print it."""
+    from hoz_dist.cli.reproduce_results import Results, read_sessions
+
+    results = Results.read(table, budget, command, jobs, out)
+    sessions = [one for one in read_sessions(out / SESSIONS_FILE) if one["table"] == table.name]
+    paths = results.write(out, sessions)
+    if docs is not None:
+        paths = results.write(docs, sessions)
+    if as_json:
+        echo_json(results.to_json())
+    else:
+        click.echo(results.text())
+    click.echo("Written: " + ", ".join(map(str, paths)), err=True)
+
+
+def _list_tables(tables: "Sequence[Table]", budget: "Budget", *, as_json: bool) -> None:
+    """Print the tables, one line each."""
+    from hoz_dist.reproduce.row import BASELINES
+
+    def trained(table: "Table") -> int:
+        return sum(row.agent not in BASELINES and not row.tested_with for row in table.rows)
+
+    if as_json:
+        echo_json({table.name: {"title": table.title, "rows": [row.name for row in table.rows]} for table in tables})
+        return
+    width = max(len(table.name) for table in tables)
+    for table in tables:
+        runs = f"{len(table.rows)} rows, {trained(table)} trained for {budget.frames(table.scenes) / 1e6:g}M frames"
+        click.echo(f"{table.name:{width}}  {table.title}: {runs}")
+    click.echo("Tables share runs. How long one takes on this machine says:")
+    click.echo(f"  hoz-dist reproduce TABLE --budget {budget.name} --estimate")
+
+
+@contextmanager
+def _alone(out: Path) -> Iterator[None]:
+    """Keep a second command out of the folder; the system ends the lock when this process ends, however it does."""
+    from filelock import FileLock, Timeout
+
+    out.mkdir(parents=True, exist_ok=True)
+    lock = FileLock(out / "reproduce.lock", timeout=0)
+    try:
+        lock.acquire()
+    except Timeout:
+        message = f"Another hoz-dist reproduce works in '{out}'; wait for it, or choose another --out."
+        raise InvalidValueError(message) from None
+    try:
+        yield
+    finally:
+        lock.release()

@@ -1,0 +1,130 @@
+"""The files in which `hoz-dist reproduce` leaves a table: Markdown, JSON and a picture."""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from hoz_dist.atomic import replace_file, write_atomically
+from hoz_dist.reproduce.budget import Budget
+from hoz_dist.reproduce.job import Job
+from hoz_dist.reproduce.markdown import table_text
+from hoz_dist.reproduce.outcome import Outcome
+from hoz_dist.reproduce.row import Table
+from hoz_dist.reproduce.summary import RowSummary, summarise
+
+
+@dataclass(frozen=True)
+class Results:
+    """What is known of a table."""
+
+    table: Table
+    budget: Budget
+    command: str
+    outcomes: Mapping[str, Mapping[int, Outcome]]
+    """By row and seed."""
+    summaries: Mapping[str, RowSummary]
+    """By row."""
+
+    @classmethod
+    def read(
+        cls, table: Table, budget: Budget, command: str, jobs: Mapping[str, Sequence[Job]], out: Path
+    ) -> "Results":
+        """Read what is finished.
+
+        Args:
+            table: The table.
+            budget: What every row gets.
+            command: The command that makes the table.
+            jobs: Of each row.
+            out: Folder of everything.
+
+        Raises:
+            DamagedFileError: A file holds no outcome.
+        """
+        outcomes = {
+            name: {job.seed: Outcome.load(job.result(out)) for job in of_row if job.result(out).exists()}
+            for name, of_row in jobs.items()
+        }
+        return cls(table, budget, command, outcomes, summarise(outcomes, table.references))
+
+    @property
+    def hours(self) -> float:
+        """Hours of one run after the other: training, choosing and testing."""
+        seconds: dict[str, float] = {}
+        for of_row in self.outcomes.values():
+            for outcome in of_row.values():
+                facts = outcome.facts
+                choice = facts.get("choice", {})
+                # Tests of one training count it once: its choice holds times that no other has.
+                run = json.dumps(choice) if choice else facts["agent"]
+                seconds[run] = facts.get("training_seconds", 0.0) + choice.get("seconds", 0.0)
+                seconds[f"test {run} {facts.get('tested_with')}"] = facts["test_seconds"]
+        return sum(seconds.values()) / 3600.0
+
+    def text(self) -> str:
+        """Return the table as Markdown."""
+        text = table_text(self.table, self.budget, self.summaries, self.command)
+        return f"{text}\n{self.hours:.1f} hours of runs in all.\n" if self.summaries else text
+
+    def to_json(self) -> dict[str, Any]:
+        """Return everything but the results of single episodes."""
+        papers = {row.name: row.paper for row in self.table.rows if row.paper is not None}
+        return {
+            "table": self.table.name,
+            "title": self.table.title,
+            "note": self.table.note,
+            "command": self.command,
+            "budget": asdict(self.budget),
+            "hours": round(self.hours, 2),
+            "rows": {
+                name: {
+                    **summary.to_json(),
+                    "paper": {
+                        part: None if figures is None else figures._asdict()
+                        for part, figures in papers[name]._asdict().items()
+                    }
+                    if name in papers
+                    else None,
+                    "runs": {seed: dict(outcome.facts) for seed, outcome in self.outcomes[name].items()},
+                }
+                for name, summary in self.summaries.items()
+            },
+        }
+
+    def write(self, folder: Path, sessions: Sequence[Mapping[str, Any]]) -> list[Path]:
+        """Write the table's files, and return them.
+
+        Args:
+            folder: Where to put them; made when it is not there.
+            sessions: How long each start of the command was expected to take, and took.
+        """
+        folder.mkdir(parents=True, exist_ok=True)
+        stem = folder / f"{self.table.name}-{self.budget.name}"
+        paths = [stem.with_suffix(".md"), stem.with_suffix(".json")]
+        write_atomically(paths[0], self.text().encode(), overwrite=True)
+        text = json.dumps(self.to_json() | {"sessions": list(sessions)}, indent=2) + "\n"
+        write_atomically(paths[1], text.encode(), overwrite=True)
+        if self.summaries:
+            from hoz_dist.reproduce.plot import table_figure
+            from hoz_dist.viz.zones import png
+
+            paths.append(stem.with_suffix(".png"))
+            write_atomically(paths[2], png(table_figure(self.table, self.summaries)), overwrite=True)
+        return paths
+
+
+def read_sessions(path: Path) -> list[dict[str, Any]]:
+    """Return what was noted of earlier starts; nothing when the file is not there or damaged: no result hangs on it."""
+    try:
+        sessions = json.loads(path.read_text("utf-8"))
+    except (FileNotFoundError, ValueError):
+        return []
+    return [one for one in sessions if isinstance(one, dict) and "table" in one] if isinstance(sessions, list) else []
+
+
+def note_session(path: Path, sessions: Sequence[Mapping[str, Any]]) -> None:
+    """Note the starts of the command, this one last."""
+    text = json.dumps(list(sessions), indent=2) + "\n"
+    replace_file(path, lambda temporary: temporary.write_text(text, "utf-8"))

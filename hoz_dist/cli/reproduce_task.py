@@ -1,0 +1,215 @@
+"""What one process of `hoz-dist reproduce` does at a stretch: trains a run, chooses its checkpoint, tests it.
+
+Whatever is finished is in a file, written atomically, and is not done again: a checkpoint every half minute, the choice
+of the checkpoint, the outcome of each test. So a process may be killed at any moment.
+"""
+
+import json
+import os
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
+
+from hoz_dist import __version__
+from hoz_dist.atomic import replace_file
+from hoz_dist.cli.launch import launch
+from hoz_dist.cli.ports import free_endpoint
+from hoz_dist.cli.run_options import as_arguments
+from hoz_dist.errors import DamagedFileError, HozError, NotFoundError
+from hoz_dist.nav.rooms import Split
+from hoz_dist.reproduce.job import Job, Task, Training
+from hoz_dist.waiting import Deadline
+
+if TYPE_CHECKING:
+    from hoz_dist.evaluation.agents import Agent
+    from hoz_dist.evaluation.benchmark import Benchmark
+    from learner.checkpoint import Checkpoint
+
+Stage = Literal["training", "choosing", "testing", "failed"]
+FREE_S: Final = 30.0
+"""How long a learner of a killed command may take to end, seconds."""
+_POLL_S: Final = 0.1
+
+
+class Report(NamedTuple):
+    """How far a task is."""
+
+    stage: Stage
+    share: float = 0.0
+    """Of the stage, in [0, 1]."""
+    note: str = ""
+    """More about it; of a failure, what went wrong."""
+
+
+Tell = Callable[[Report], None]
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where tasks keep things."""
+
+    out: Path
+    """Folder of all runs and results."""
+    cache: Path
+    """The view cache; it has the rooms already."""
+
+
+def perform(task: Task, place: Place, tell: Tell) -> None:
+    """Do what is left of a task.
+
+    Args:
+        task: The task.
+        place: Where things are kept.
+        tell: Told how far it is.
+
+    Raises:
+        HozError: Something failed that will fail again.
+    """
+    waiting = task.waiting(place.out)
+    if not waiting:
+        return
+    if task.training is not None:
+        _train(task.training, place, tell)
+    import torch
+
+    torch.set_num_threads(1)  # as everywhere: results do not depend on the number of cores
+    for job in waiting:
+        _test(job, place, tell)
+
+
+def frames_of(training: Training, out: Path) -> int:
+    """Return how many frames a training has made, as its newest checkpoint says; 0 before the first."""
+    from learner.checkpoint import load_checkpoint
+
+    try:
+        return load_checkpoint(training.folder(out)).frames
+    except NotFoundError:
+        return 0
+
+
+def _train(training: Training, place: Place, tell: Tell) -> None:
+    """Train, or go on with it, by the real service: a learner and one actor, which do the same again."""
+    from learner.run_folder import RunFolder
+
+    folder = training.folder(place.out)
+    tell(Report("training"))
+    if frames_of(training, place.out) >= training.frames:
+        return
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    config = folder.with_name(f"{folder.name}.config.json")
+    _write_json(config, training.config.to_json())
+    run, pause, deadline = RunFolder(folder, training.config), threading.Event(), Deadline(FREE_S)
+    while run.is_held(run.newest_epoch()) and not deadline.passed:
+        pause.wait(_POLL_S)
+    learner = ["--config", str(config), "--keep-every", str(training.keep_every), "--quiet"]
+    actor = as_arguments({"scene": training.scenes, "cache": place.cache})
+
+    def report(status: dict[str, Any]) -> None:
+        tell(Report("training", status["progress"] or 0.0, f"{status['frames_per_second']:,.0f} frames/s"))
+
+    launch(folder, free_endpoint(), learner, actor, actors=1, tell=report)
+    if frames_of(training, place.out) < training.frames:
+        message = f"The run in '{folder}' ended before its budget was used up; see its logs, and start again."
+        raise HozError(message)
+
+
+def _choose(job: Job, training: Training, place: Place, tell: Tell) -> "tuple[Checkpoint, dict[str, Any]]":
+    """Return the checkpoint that is best on validation rooms by SR, then SPL, then frames; and how it was chosen."""
+    from hoz_dist.evaluation.loading import load_agent
+    from hoz_dist.nav.metrics import metrics_of
+    from learner.checkpoint import FOLDER, KEPT_SUFFIX, SUFFIX, load_checkpoint
+
+    file, folder = job.choice(place.out), training.folder(place.out) / FOLDER
+    if file.exists():
+        choice = _read_json(file)
+        return load_checkpoint(folder / choice["checkpoint"]), choice
+    protocol, began = job.protocol, time.monotonic()
+    benchmark = _benchmark(
+        place, training.config.picture_size, protocol.rooms("val"), "val", protocol.validation_episodes
+    )
+    candidates: list[dict[str, Any]] = []
+    kept = sorted(folder.glob(f"*{KEPT_SUFFIX}"))[-protocol.candidates :]
+    for number, mark in enumerate(kept):
+        tell(Report("choosing", number / len(kept)))
+        checkpoint = load_checkpoint(mark.with_suffix(SUFFIX))
+        agent = load_agent(checkpoint.config, checkpoint.parameters, checkpoint.scene_graphs())
+        metrics = metrics_of(benchmark.run(agent, [0]).trials[0])
+        candidates.append(
+            {"checkpoint": mark.with_suffix(SUFFIX).name, "frames": checkpoint.frames}
+            | {name: round(100 * getattr(metrics, name), 2) for name in ("sr", "spl", "sae")}
+        )
+    if not candidates:
+        message = f"The run in '{folder.parent}' has kept no checkpoint; delete its folder, and start again."
+        raise NotFoundError(message)
+    best = max(candidates, key=lambda one: (one["sr"], one["spl"], one["frames"]))
+    choice = {"checkpoint": best["checkpoint"], "candidates": candidates, "seconds": time.monotonic() - began}
+    _write_json(file, choice)
+    return load_checkpoint(folder / best["checkpoint"]), choice
+
+
+def _test(job: Job, place: Place, tell: Tell) -> None:
+    """Test an agent on the test rooms, once for all, and keep what came of every episode."""
+    from hoz_dist.evaluation.agents import OracleAgent, RandomAgent
+    from hoz_dist.evaluation.loading import load_agent
+    from hoz_dist.reproduce.outcome import Outcome
+
+    facts: dict[str, Any] = {"agent": job.agent, "version": __version__, "cores": len(os.sched_getaffinity(0))}
+    protocol, config = job.protocol, job.test_config
+    chosen = None
+    if job.training is not None:
+        checkpoint, choice = _choose(job, job.training, place, tell)
+        chosen = replace(checkpoint, config=config)
+        facts |= {
+            "config": config.to_json(),
+            "rooms_trained_in": list(job.training.scenes),
+            "tested_with": dict(job.tested_with),
+            "frames": checkpoint.frames,
+            "training_seconds": round(checkpoint.seconds, 1),
+            "choice": choice,
+        }
+    benchmark = _benchmark(place, config.picture_size, protocol.rooms("test"), "test", protocol.test_episodes)
+    agent: Agent
+    if chosen is not None:
+        agent = load_agent(config, chosen.parameters, chosen.scene_graphs())
+    else:
+        agent = RandomAgent() if job.agent == "random" else OracleAgent(list(benchmark.rooms))
+    began = time.monotonic()
+
+    def progress(done: int, total: int) -> None:
+        tell(Report("testing", done / total))
+
+    evaluation = benchmark.run(agent, range(protocol.trials), progress=progress)
+    facts["test_seconds"] = round(time.monotonic() - began, 1)
+    Outcome.of(evaluation, facts).save(job.result(place.out))
+
+
+@cache
+def _benchmark(place: Place, picture_size: int, rooms: tuple[Any, ...], split: Split, episodes: int) -> "Benchmark":
+    """Open rooms and draw their episodes; tests of one process share them."""
+    from hoz_dist.evaluation.benchmark import Benchmark
+    from hoz_dist.policy.encoders import load_encoder
+    from hoz_dist.sim.view_store import ViewStore
+
+    store, encoder = ViewStore(place.cache, picture_size), load_encoder("pooled")
+    return Benchmark.of([store.open(room, encoder) for room in rooms], split, episodes)
+
+
+def _write_json(path: Path, value: object) -> None:
+    text = json.dumps(value, indent=2) + "\n"
+    replace_file(path, lambda temporary: temporary.write_text(text, "utf-8"))
+
+
+def _read_json(path: Path) -> dict[str, Any]:
+    try:
+        value = json.loads(path.read_text("utf-8"))
+    except ValueError as error:
+        message = f"'{path}' is damaged ({error}); delete it, and what it held is done again."
+        raise DamagedFileError(message) from error
+    if not isinstance(value, dict) or "checkpoint" not in value:
+        message = f"'{path}' does not name a checkpoint; delete it, and what it held is done again."
+        raise DamagedFileError(message)
+    return value

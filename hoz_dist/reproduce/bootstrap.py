@@ -1,0 +1,80 @@
+"""Confidence intervals of differences between rows: a bootstrap over seeds and episodes at once.
+
+A figure is uncertain because other seeds would have trained other agents, and because other episodes would have been
+drawn. Both are resampled: in each replicate the seeds of a row, with replacement, and the episodes, with replacement.
+All rows were tested on the same episodes, so each replicate draws the *same* episodes for both rows: what makes an
+episode hard cancels out. When both rows have the same seeds, it draws the same seeds too, as they share the draw of
+initial parameters; else each row's own. Trials are not resampled: their mean enters.
+
+Noise of a single seed in a single episode, such as what is left of the draw of actions, is counted by the seeds, by the
+episodes and by both together, so that it weighs up to three times: intervals are rather too wide than too narrow
+(Owen, The pigeonhole bootstrap, 2007). The variance between S seeds is understated by (S - 1) / S, as in any bootstrap;
+with one seed there is none: the interval then is of the episodes alone, and tells nothing about another training.
+Tables say so.
+"""
+
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+REPLICATES: Final = 4000
+CONFIDENCE: Final = 0.95
+_SEED: Final = 2109
+
+
+class Interval(NamedTuple):
+    """A difference and its confidence interval, in the unit of the values."""
+
+    difference: float
+    low: float
+    high: float
+
+
+class Resampling:
+    """The draws of all replicates, the same for every comparison of some episodes.
+
+    Args:
+        episodes: E, number of episodes.
+        replicates: B.
+        seed: Of the draws.
+    """
+
+    def __init__(self, episodes: int, replicates: int = REPLICATES, seed: int = _SEED) -> None:
+        self._rng_seed = seed
+        self._replicates = replicates
+        rng = np.random.default_rng([seed, episodes])
+        counts = rng.multinomial(episodes, np.full(episodes, 1.0 / episodes), size=replicates)
+        self._episode_weights = (counts / episodes).astype(np.float32)  # [B, E]; each row sums to 1
+
+    def interval(
+        self,
+        row: NDArray[np.float64],
+        reference: NDArray[np.float64],
+        *,
+        same_seeds: bool,
+        confidence: float = CONFIDENCE,
+    ) -> Interval:
+        """Compare a row with a reference.
+
+        Args:
+            row: Mean over trials of each seed and episode, [S, E].
+            reference: The same of the reference, [R, E].
+            same_seeds: Whether seed i of one is seed i of the other; S = R then.
+            confidence: Share of the replicates within the interval.
+
+        Returns:
+            Difference of the means, row - reference, with its percentile interval.
+        """
+        difference = float(row.mean() - reference.mean())
+        draws = self._means(row - reference, 0) if same_seeds else self._means(row, 0) - self._means(reference, 1)
+        low, high = np.quantile(draws, [(1 - confidence) / 2, (1 + confidence) / 2])
+        return Interval(difference, float(low), float(high))
+
+    def _means(self, values: NDArray[np.float64], stream: int) -> NDArray[np.float64]:
+        """Return the mean of each replicate, [B], of values [S, E]; equal streams and S draw equal seeds."""
+        seeds = len(values)
+        rng = np.random.default_rng([self._rng_seed, seeds, stream])
+        weights = rng.multinomial(seeds, np.full(seeds, 1.0 / seeds), size=self._replicates) / seeds  # [B, S]
+        of_seeds = self._episode_weights @ values.T.astype(np.float32)  # [B, S]
+        return np.asarray((weights * of_seeds).sum(axis=1), dtype=np.float64)

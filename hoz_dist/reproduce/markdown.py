@@ -1,0 +1,135 @@
+"""Tables of results as Markdown, aligned so that they can be read as they are."""
+
+import statistics
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Final
+
+from hoz_dist.reproduce.bootstrap import CONFIDENCE, REPLICATES, Interval
+from hoz_dist.reproduce.budget import Budget
+from hoz_dist.reproduce.outcome import METRICS
+from hoz_dist.reproduce.row import Figures, Paper, Row, Table
+from hoz_dist.reproduce.summary import RowSummary, Spread
+
+_NOTHING: Final = "-"
+
+
+def table_text(table: Table, budget: Budget, summaries: Mapping[str, RowSummary], command: str) -> str:
+    """Write a table's results as Markdown.
+
+    Args:
+        table: The table.
+        budget: What every row got.
+        summaries: By row; rows without results are left out.
+        command: What made the results.
+    """
+    rows = [row for row in table.rows if row.name in summaries]
+    lines = [f"# {table.title}", ""]
+    if not rows:
+        return "\n".join([*lines, "No results yet.", ""])
+    lines += [_protocol(table, budget, summaries, command), ""]
+    if table.note:
+        lines += [table.note, ""]
+    lines += _figures(rows, summaries)
+    if table.alike:
+        lines += ["", _spread_of_rows(table, summaries)]
+    for reference in table.references:
+        compared = [row.name for row in rows if reference in summaries[row.name].differences]
+        if compared:
+            lines += ["", f"## Differences from {reference}", "", _kind(compared, reference, summaries), ""]
+            lines += _differences(compared, reference, summaries)
+    return "\n".join([*lines, ""])
+
+
+def _protocol(table: Table, budget: Budget, summaries: Mapping[str, RowSummary], command: str) -> str:
+    one = next(iter(summaries.values()))
+    frames = budget.frames(table.scenes) / 1e6
+    return (
+        f"`{command}`: {frames:g}M frames for each training run; the checkpoint was chosen among the last "
+        f"{budget.candidates} of {budget.checkpoints} on validation rooms. {one.episodes['all']} episodes in test rooms"
+        f", {one.episodes.get('long', 0)} of them with L* >= 5; {budget.trials} trials. Percent; ± is the standard "
+        "deviation over the trials of all seeds. The paper's figures are of AI2-THOR."
+    )
+
+
+def _figures(rows: Sequence[Row], summaries: Mapping[str, RowSummary]) -> list[str]:
+    """Write means and deviations, and the paper's figures if it has any of these rows."""
+    with_paper = any(row.paper is not None for row in rows)
+    header = ["row", "seeds", "SR", "SPL", "SAE", "L>=5: SR", "SPL", "SAE"]
+    header += ["paper: SR/SPL/SAE", "L>=5"] if with_paper else []
+    cells = []
+    for row in rows:
+        summary = summaries[row.name]
+        line = [row.name, str(len(summary.seeds)) if summary.seeds and row.agent not in {"random", "oracle"} else "-"]
+        for part in ("all", "long"):
+            spreads = summary.spreads.get(part, {})
+            line += [_spread(spreads.get(metric)) for metric in METRICS]
+        paper = row.paper or Paper()
+        line += [_of_paper(paper.all), _of_paper(paper.long)] if with_paper else []
+        cells.append(line)
+    return aligned(header, cells)
+
+
+def _differences(compared: Iterable[str], reference: str, summaries: Mapping[str, RowSummary]) -> list[str]:
+    cells = []
+    for name in compared:
+        parts = summaries[name].differences[reference]
+        line = [name]
+        for part in ("all", "long"):
+            line += [_interval(parts.get(part, {}).get(metric)) for metric in ("sr", "spl", "sae")]
+        cells.append(line)
+    return aligned(["row", "SR", "SPL", "SAE", "L>=5: SR", "SPL", "SAE"], cells)
+
+
+def _kind(compared: Sequence[str], reference: str, summaries: Mapping[str, RowSummary]) -> str:
+    """Say what the intervals are of."""
+    own = len(summaries[reference].seeds)
+    single = [name for name in compared if min(own, len(summaries[name].seeds)) == 1]
+    text = (
+        f"Percent points with {CONFIDENCE:.0%} intervals: {REPLICATES} bootstrap replicates over seeds (paired where "
+        "both rows have the same) and episodes (always paired)."
+    )
+    if single:
+        text += f" Of one seed on either side, so hardly anything about another training: {', '.join(single)}."
+    return text
+
+
+def _spread_of_rows(table: Table, summaries: Mapping[str, RowSummary]) -> str:
+    others = [one for name, one in summaries.items() if name not in table.references]
+    if len(others) < 2:  # noqa: PLR2004 - no deviation of one
+        return ""
+    means = {metric: [one.spreads["all"][metric].mean for one in others] for metric in METRICS}
+    figures = ", ".join(
+        f"{metric.upper()} {statistics.fmean(values):.2f} ± {statistics.stdev(values):.2f}"
+        for metric, values in means.items()
+    )
+    return f"Mean and standard deviation over the {len(others)} rows other than the reference: {figures}."
+
+
+def _spread(spread: Spread | None) -> str:
+    return _NOTHING if spread is None else f"{spread.mean:.1f} ± {spread.of_trials:.1f}"
+
+
+def _interval(interval: Interval | None) -> str:
+    if interval is None:
+        return _NOTHING
+    return f"{interval.difference:+.1f} [{interval.low:+.1f}, {interval.high:+.1f}]"
+
+
+def _of_paper(figures: Figures | None) -> str:
+    return _NOTHING if figures is None else "/".join(f"{value:.2f}" for value in figures)
+
+
+def aligned(header: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
+    """Return the lines of a Markdown table with aligned columns, the first to the left, the others to the right."""
+    cells = [list(header), *map(list, rows)]
+    widths = [max(len(row[column]) for row in cells) for column in range(len(header))]
+
+    def line(row: Sequence[str]) -> str:
+        first, *others = (
+            cell.ljust(width) if not column else cell.rjust(width)
+            for column, (cell, width) in enumerate(zip(row, widths, strict=True))
+        )
+        return f"| {' | '.join([first, *others])} |"
+
+    rule = [":" + "-" * (widths[0] - 1), *("-" * (width - 1) + ":" for width in widths[1:])]
+    return [line(cells[0]), line(rule), *map(line, cells[1:])]

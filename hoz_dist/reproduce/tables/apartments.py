@@ -1,0 +1,28 @@
+"""Table 8 of the paper: apartments of several rooms, RoboTHOR's there and generated ones here.
+
+The paper's figures were not at hand. There is one graph over all apartments, as in the paper; it has 16 zones, since an
+apartment has about as many kinds of places as two rooms.
+"""
+
+from typing import Final
+
+from hoz_dist.reproduce.row import Row, Table
+
+_ZONES: Final = {"zones": 16}
+
+APARTMENTS: Final = Table(
+    name="apartments",
+    title="Methods in apartments (Table 8)",
+    references=("a3c", "object"),
+    scenes=("apartment",),
+    rows=(
+        Row(name="random", agent="random"),
+        Row(name="a3c", agent="a3c", key=True),
+        Row(name="object", agent="object", key=True),
+        Row(name="org", agent="org"),
+        Row(name="hoz", agent="hoz", key=True, options=_ZONES),
+        Row(name="hoz-tpn", agent="hoz-tpn", options=_ZONES),
+        Row(name="oracle", agent="oracle"),
+    ),
+    note="Every trained row has the same episodes, frames, learning rate and ground-truth detections.",
+)

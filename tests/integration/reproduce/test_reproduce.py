@@ -1,0 +1,75 @@
+"""`hoz-dist reproduce` from nothing to a table, with a kill in between: real runs over real Zenoh."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from hoz_dist.cli.main import run
+from hoz_dist.nav.rooms import SPLITS
+from hoz_dist.reproduce.budget import BUDGETS
+from hoz_dist.reproduce.tables import TABLES
+from hoz_dist.wire.transport.environment import child_environment
+from tests.integration.reproduce.tables import FEW_ROOMS, TINY_BUDGET, TINY_TABLE
+from tests.waiting import until
+
+pytestmark = pytest.mark.integration
+
+
+def words_for(out: Path, cache: Path) -> list[str]:
+    return ["reproduce", "tiny", "--budget", "tiny", "--jobs", "1", "--out", str(out), "--cache", str(cache)]
+
+
+def start(out: Path, cache: Path, *options: str) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [sys.executable, "-m", "tests.integration.reproduce.tiny", *words_for(out, cache), *options],
+        env=child_environment() | {"PYTHONPATH": os.pathsep.join(sys.path)},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def test_a_killed_command_goes_on_and_makes_the_table(
+    tmp_path: Path, cache: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    with start(out, cache) as killed:
+        until(lambda: any(out.glob("runs/hoz-*/seed-0/checkpoints/*.keep")), "a checkpoint")
+        killed.send_signal(signal.SIGKILL)
+
+    with start(out, cache, "--json") as again:
+        printed, told = again.communicate(timeout=90)
+    assert again.returncode == 0, told
+    assert "1 runs, 1 at once, take about" in told
+
+    # The run went on where it was.
+    (folder,) = out.glob("runs/hoz-*/seed-0")
+    begins = (folder / "updates" / "epoch-0002.jsonl").read_text().splitlines()[0]
+    assert json.loads(begins)["from_version"] > 0
+
+    results = json.loads(printed)
+    assert list(results["rows"]) == ["hoz", "order 1"]
+    for row in results["rows"].values():
+        assert (row["trials"], row["episodes"]["all"]) == (2, 20)
+        assert row["runs"]["0"]["frames"] >= 6000
+        assert len(row["runs"]["0"]["choice"]["candidates"]) == 2
+    assert set(results["rows"]["order 1"]["differences"]["hoz"]["all"]["sr"]) == {"difference", "low", "high"}
+    assert "| order 1 |" in (out / "tiny-tiny.md").read_text()
+    assert (out / "tiny-tiny.png").read_bytes().startswith(b"\x89PNG")
+    sessions = json.loads((out / "tiny-tiny.json").read_text())["sessions"]
+    assert [session["took_seconds"] is None for session in sessions] == [True, False]
+
+    # What is finished is not done again, the test rooms least of all.
+    kept = {path: path.stat().st_mtime_ns for path in out.glob("results/*/*.json")}
+    assert len(kept) == 2
+    monkeypatch.setitem(TABLES, "tiny", TINY_TABLE)
+    monkeypatch.setitem(BUDGETS, "tiny", TINY_BUDGET)
+    monkeypatch.setitem(SPLITS, "bathroom", FEW_ROOMS)
+    assert run([*words_for(out, cache), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == results
+    assert {path: path.stat().st_mtime_ns for path in out.glob("results/*/*.json")} == kept

@@ -1,0 +1,95 @@
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hoz_dist.reproduce.markdown import aligned, table_text
+from hoz_dist.reproduce.outcome import Outcome
+from hoz_dist.reproduce.plot import table_figure
+from hoz_dist.reproduce.row import Figures, Paper
+from hoz_dist.reproduce.summary import summarise
+from hoz_dist.viz.zones import png
+from tests.unit.reproduce.making import TABLE, TINY, make_outcome
+
+
+@pytest.fixture
+def outcomes() -> dict[str, dict[int, Outcome]]:
+    return {
+        "random": {0: make_outcome(9, skill=0.1)},
+        "object": {seed: make_outcome(20 + seed, skill=0.5) for seed in range(2)},
+        "hoz": {seed: make_outcome(seed, skill=0.8) for seed in range(2)},
+    }
+
+
+def test_means_and_deviations_are_of_all_trials_of_all_seeds(outcomes: dict[str, dict[int, Outcome]]) -> None:
+    spread = summarise(outcomes, ["hoz"])["hoz"].spreads["all"]["sr"]
+    trials = np.array([outcome.success.mean(axis=1) for outcome in outcomes["hoz"].values()]) * 100
+    assert spread.mean == pytest.approx(trials.mean())
+    assert spread.of_trials == pytest.approx(trials.std(ddof=1))
+    assert spread.of_seeds == pytest.approx(trials.mean(axis=1).std(ddof=1))
+
+
+def test_differences_are_from_the_references_that_there_are(outcomes: dict[str, dict[int, Outcome]]) -> None:
+    summaries = summarise(outcomes, ["hoz", "a3c"])
+    assert summaries["hoz"].differences == {}
+    interval = summaries["object"].differences["hoz"]["long"]["sr"]
+    long = outcomes["hoz"][0].long
+    means = [np.mean([one.success[:, long].mean() for one in outcomes[name].values()]) for name in ("object", "hoz")]
+    assert interval.difference == pytest.approx(100 * (means[0] - means[1]), abs=1e-3)
+    assert interval.low < interval.difference < interval.high < 0
+
+
+def test_scenes_are_told_apart(outcomes: dict[str, dict[int, Outcome]]) -> None:
+    of_scenes = summarise(outcomes, [])["random"].by_scene
+    assert list(of_scenes) == ["kitchen", "bathroom"]
+    kitchen = outcomes["random"][0].success[:, outcomes["random"][0].scene == "kitchen"]
+    assert of_scenes["kitchen"]["sr"] == pytest.approx(100 * kitchen.mean())
+
+
+def test_outcomes_of_other_episodes_are_not_compared(outcomes: dict[str, dict[int, Outcome]]) -> None:
+    one = outcomes["hoz"][0]
+    outcomes["hoz"][0] = replace(one, optimal=one.optimal + 1)
+    with pytest.raises(ValueError, match="different episodes"):
+        summarise(outcomes, ["hoz"])
+
+
+def test_episodes_that_are_all_short_have_no_long_part() -> None:
+    short = make_outcome()
+    short = replace(short, optimal=np.minimum(short.optimal, 4))
+    summaries = summarise({"hoz": {0: short}}, ["hoz"])
+    assert list(summaries["hoz"].spreads) == ["all"]
+    assert table_text(TABLE, TINY, summaries, "command").endswith("|        - |   - |   - |\n")
+    assert png(table_figure(TABLE, summaries)).startswith(b"\x89PNG")
+
+
+def test_markdown_has_rows_intervals_and_the_papers_figures(outcomes: dict[str, dict[int, Outcome]]) -> None:
+    paper = Paper(Figures(57.35, 33.78, 19.02))
+    table = replace(TABLE, rows=(replace(TABLE.rows[0], paper=paper), *TABLE.rows[1:]), alike=True)
+    summaries = summarise(outcomes, table.references)
+    text = table_text(table, TINY, summaries, "hoz-dist reproduce some")
+    lines = text.splitlines()
+    assert lines[0] == "# Some rows"
+    row = next(line for line in lines if line.startswith("| random"))
+    assert "57.35/33.78/19.02" in row
+    assert f"{summaries['random'].spreads['all']['sr'].mean:.1f} ±" in row
+    interval = summaries["object"].differences["hoz"]["all"]["sr"]
+    assert f"{interval.difference:+.1f} [{interval.low:+.1f}, {interval.high:+.1f}]" in text
+    assert "hardly anything about another training: random." in text
+    assert "over the 2 rows other than the reference" in text
+    assert "other order" not in text
+    json.dumps({name: summary.to_json() for name, summary in summaries.items()}, allow_nan=False)
+    assert png(table_figure(table, summaries)).startswith(b"\x89PNG")
+
+
+def test_a_table_without_results_says_so() -> None:
+    assert "No results yet." in table_text(TABLE, TINY, summarise({"hoz": {}}, ["hoz"]), "command")
+
+
+def test_columns_of_markdown_are_aligned() -> None:
+    assert aligned(["row", "SR"], [["a", "1.0"], ["longer", "10.0"]]) == [
+        "| row    |   SR |",
+        "| :----- | ---: |",
+        "| a      |  1.0 |",
+        "| longer | 10.0 |",
+    ]
