@@ -73,7 +73,7 @@ def rooms_option(default: int) -> Callable[[F], F]:
     return click.option(
         "--rooms",
         "most_rooms",
-        type=click.IntRange(1, len(SPLITS["train"])),
+        type=click.IntRange(1, max(len(splits["train"]) for splits in SPLITS.values())),
         default=default,
         show_default=True,
         help="Training rooms of each scene to use; more take longer to get ready.",

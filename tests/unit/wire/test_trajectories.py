@@ -128,7 +128,7 @@ def with_reset_first(steps: Steps) -> np.ndarray:
     [
         ("target", 22, Reason.RANGE),
         ("flags", 32, Reason.RANGE),
-        ("scene", 4, Reason.RANGE),
+        ("scene", 5, Reason.RANGE),
         ("current", 64, Reason.RANGE),
         ("subgoal", 64, Reason.RANGE),
         ("previous_action", 7, Reason.RANGE),
