@@ -22,9 +22,9 @@ ParametersForm = Literal["full", "delta"]
 Source = Literal["gradients", "rollouts"]
 """What actors push, and the learner learns from."""
 
-PRESET_LEARNING_RATES: Final[dict[Preset, float]] = {"compact": 1e-3, "paper": 1e-4}
+PRESET_LEARNING_RATES: Final[dict[Preset, float]] = {"compact": 1e-3, "medium": 1e-3, "paper": 1e-4}
 """Adam's learning rate at the start; the paper's is 1e-4."""
-PRESET_PRECISIONS: Final[dict[Preset, Precision]] = {"compact": "fp32", "paper": "bf16"}
+PRESET_PRECISIONS: Final[dict[Preset, Precision]] = {"compact": "fp32", "medium": "fp32", "paper": "bf16"}
 """Precision of the LSTM's products: small ones gain nothing from the lower one."""
 
 
@@ -71,7 +71,7 @@ class RunConfig:
     """B, episodes that an actor runs at once."""
     rollout_steps: int = 20
     """T, steps of a rollout."""
-    discount: float = 0.99
+    discount: float = 0.97
     gae_lambda: float = 0.95
     entropy_weight: float = 0.02
     value_weight: float = 0.5
@@ -79,6 +79,10 @@ class RunConfig:
     """Weight of the scene layer's cross-entropy."""
     imitation_weight: float = 1.0
     """Weight of the cross-entropy with the expert's actions, of methods that imitate; without effect on others."""
+    approach_weight: float = 0.5
+    """Weight at the start of the cross-entropy with the actions of shortest paths, once the target was seen."""
+    approach_frames: int = 2_000_000
+    """Frames over which that weight falls linearly to 0."""
     learning_rate: float = 1e-3
     """Adam's learning rate at the start; falls linearly to 0 over the budget, if there is one."""
     gradient_norm: float = 1.0
@@ -164,6 +168,15 @@ class RunConfig:
         """
         return self.max_lag if self.learn_from == "gradients" else 2 * self.max_lag + 1
 
+    def approach_weight_at(self, version: int) -> float:
+        """Return the weight of what is imitated of shortest paths, at a parameter version.
+
+        A version is an update, which is of T * B frames, less those between episodes; so actors, learners and replays
+        know the weight without being told.
+        """
+        frames = version * self.rollout_steps * self.batch
+        return self.approach_weight * max(0.0, 1.0 - frames / self.approach_frames)
+
     def to_json(self) -> dict[str, Any]:
         """Return the configuration as JSON values."""
         return asdict(self) | {"without": list(self.without), "relations": list(self.relations)}
@@ -233,6 +246,8 @@ _LATER: Final[dict[str, Any]] = {
     "graph_source": "rooms",
     "scenes": len(ROOM_SCENES),
     "imitation_weight": 1.0,
+    "approach_weight": 0.0,
+    "approach_frames": 2_000_000,
     "relations": [],
 }
 """Fields that the first run folders do not have, and what they were then."""
@@ -252,6 +267,8 @@ _RANGES: Final = (
     ("value_weight", 0.0, 10.0),
     ("scene_weight", 0.0, 10.0),
     ("imitation_weight", 0.0, 10.0),
+    ("approach_weight", 0.0, 10.0),
+    ("approach_frames", 1, 10**15),
     ("learning_rate", 1e-8, 1.0),
     ("gradient_norm", 1e-3, 1e6),
     ("max_lag", 0, 100_000),

@@ -71,6 +71,11 @@ class FlatAdam:
         """The parameters, [P], where the next step changes them."""
         return self._tensor
 
+    @property
+    def updates(self) -> int:
+        """Number of gradients applied."""
+        return int(self._steps.item())
+
     def set_progress(self, progress: float) -> None:
         """Set the learning rate to ``base * (1 - progress)``; progress is the share of the budget used."""
         self.learning_rate = self.base_learning_rate * (1.0 - min(max(progress, 0.0), 1.0))

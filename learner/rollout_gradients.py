@@ -21,7 +21,7 @@ from hoz_dist.a3c.norm import gradient_norm
 from hoz_dist.config import RunConfig
 from hoz_dist.gradient_forms import Vector
 from hoz_dist.graph.scene_graph import SceneGraph
-from hoz_dist.nav.actions import NO_ACTION
+from hoz_dist.nav.actions import NO_ACTION, felt
 from hoz_dist.nav.categories import SCENES, scene_index
 from hoz_dist.nav.observation import Observation
 from hoz_dist.nav.rooms import RoomId
@@ -76,7 +76,7 @@ class RolloutGradients:
         """Why rooms cannot be opened."""
         self._source = StoredViews()
         self._transitions: RowTable[np.int32] = RowTable()
-        self._expert = ExpertTable() if self._policy.imitates else None
+        self._expert = ExpertTable() if self._policy.imitates or config.approach_weight else None
         self._epoch = 0
         self._graphs: dict[str, OrderedDict[int, SceneGraph]] = {}
         self._banks: OrderedDict[tuple[tuple[str, int], ...], GraphBank] = OrderedDict()
@@ -167,7 +167,7 @@ class RolloutGradients:
             current=_long(steps.current),
             subgoal=_long(steps.subgoal),
         )
-        loss, state = self._differentiator.off_policy(behaviour, observation, guidance, start, bank)
+        loss, state = self._differentiator.off_policy(behaviour, observation, guidance, start, bank, push.version)
         gradient = self._parameters.gradients.numpy()
         if not np.isfinite(gradient_norm(gradient)):
             raise RejectedError(Reason.INTERNAL, "the gradient of the rollout is not finite")
@@ -186,7 +186,7 @@ class RolloutGradients:
         )
 
     def _expert_actions(self, views: NDArray[np.int64], targets: NDArray[np.int64]) -> Tensor | None:
-        """Look up what the expert would have done at views over all rooms, [T, B], if the policy is taught it."""
+        """Look up what the expert might have done at views over all rooms, [T, B, 6], if the policy is taught it."""
         return None if self._expert is None else torch.from_numpy(self._expert.look_up(views, targets))
 
     def _check_shape(self, steps: Steps) -> None:
@@ -257,7 +257,7 @@ def _known(before: Tensor, steps: Steps) -> Tensor:
 
 
 def _behaviour(steps: Steps, known: Tensor, expert: Tensor | None) -> Behaviour:
-    """Return what the actor did, and the expert would have done; where the state is not known nothing is learnt."""
+    """Return what the actor did, and the expert might have done; where the state is not known nothing is learnt."""
     valid = torch.from_numpy(steps.has(Flag.VALID)[:-1])
     return Behaviour(
         actions=_long(steps.action),
@@ -272,8 +272,10 @@ def _behaviour(steps: Steps, known: Tensor, expert: Tensor | None) -> Behaviour:
 
 
 def _previous_actions(steps: Steps) -> NDArray[np.int64]:
-    """Return the action before each row, [T + 1, B]."""
-    after = np.where(steps.has(Flag.FIRST)[1:], NO_ACTION, steps.action)
+    """Return the action before each row, as it was felt, [T + 1, B]."""
+    # An action stays in its room; where the room changes, an episode begins.
+    stayed = steps.view[1:] == steps.view[:-1]
+    after = np.where(steps.has(Flag.FIRST)[1:], NO_ACTION, felt(steps.action.astype(np.int64), stayed))
     return np.concatenate([steps.previous_action[None], after]).astype(np.int64)
 
 

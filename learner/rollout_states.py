@@ -29,12 +29,17 @@ class Ended(NamedTuple):
         """Return what a rollout ended with, in memory of its own."""
         zone = ZoneState(*(part.clone() for part in state.zone))
         memory = tuple(part.clone() for part in state.memory)
-        return cls(push.incarnation, push.sequence, State(state.lstm.clone(), zone, memory), known.clone())
+        return cls(
+            push.incarnation,
+            push.sequence,
+            State(state.lstm.clone(), zone, memory, state.sighted.clone()),
+            known.clone(),
+        )
 
     @property
     def size(self) -> int:
         """Bytes that it takes."""
-        tensors = (self.state.lstm, *self.state.zone, *self.state.memory, self.known)
+        tensors = (self.state.lstm, *self.state.zone, *self.state.memory, self.state.sighted, self.known)
         return sum(tensor.numel() * tensor.element_size() for tensor in tensors)
 
 

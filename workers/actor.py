@@ -217,7 +217,7 @@ class Actor:
 
     def _load(self, parameters: Parameters) -> None:
         with self._clock("load"):
-            self._collector.parameters.load(parameters.vector)
+            self._collector.load(parameters.vector, parameters.head.version)
 
     def _update_by_gradient(self) -> None:
         """Fetch parameters, roll out, push the gradient."""

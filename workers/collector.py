@@ -61,7 +61,7 @@ class Collector:
         clock: Measures how long the way back over a rollout takes.
 
     Attributes:
-        parameters: The policy's parameters; load new ones between rollouts.
+        parameters: The policy's parameters and their gradients; see `load`.
     """
 
     def __init__(
@@ -74,10 +74,21 @@ class Collector:
         self._policy: ActorCritic = make_policy(config.policy, config.seed)
         self.parameters = FlatParameters(self._policy)
         self._differentiator = Differentiator(config, self._policy, self.parameters)
+        self._version = 0
         self._tape = self._policy.tape(config.rollout_steps, config.batch)
         self._bank = GraphBank(config.zones, config.edge_cost, config.subgoal)
         self._state: State = self._policy.initial_state(config.batch)
-        self._expert = ExpertTable() if self._policy.imitates else None
+        self._expert = ExpertTable() if self._policy.imitates or config.approach_weight else None
+
+    def load(self, parameters: NDArray[np.float32], version: int) -> None:
+        """Act with these parameters from the next rollout on.
+
+        Args:
+            parameters: [P].
+            version: Theirs; the weight of what is imitated depends on it.
+        """
+        self.parameters.load(parameters)
+        self._version = version
 
     def use_graph(self, graph: SceneGraph) -> None:
         """Use a scene graph from the next step on.
@@ -117,7 +128,9 @@ class Collector:
         observation = Observation(*map(np.stack, zip(*(moment.observation for moment in acted), strict=True)))
         guidance = Guidance(*map(torch.stack, zip(*(moment.decision.guidance for moment in acted), strict=True)))
         with self._clock("differentiate"):
-            loss = self._differentiator.on_policy(rollout, observation, guidance, start, self._bank, self._tape)
+            loss = self._differentiator.on_policy(
+                rollout, observation, guidance, start, self._bank, self._tape, self._version
+            )
         return Update(self.parameters.gradients.numpy(), rollout.frames, loss, _finished(acted))
 
     def record(self) -> Trajectory:
@@ -148,7 +161,7 @@ class Collector:
         return acted, self._look()
 
     def _expert_actions(self, acted: list[Acted]) -> Tensor | None:
-        """Look up what the expert would have done at each step, [T, B], if the policy is taught it."""
+        """Look up what the expert might have done at each step, [T, B, 6], if the policy is taught it."""
         if self._expert is None:
             return None
         rooms = self._env.rooms

@@ -36,7 +36,7 @@ class Behaviour(NamedTuple):
     taken: int | None = None
     """Number of actions taken; see `Rollout`."""
     expert: Tensor | None = None
-    """Action of a shortest path, int64 [T, B]; see `Rollout`."""
+    """Which actions begin a shortest path, bool [T, B, 6]; see `Rollout`."""
 
 
 class Differentiator:
@@ -53,6 +53,7 @@ class Differentiator:
         self._parameters = parameters
         self._largest_norm = config.gradient_norm
         self._size = config.rollout_steps, config.batch
+        self._approach_weight = config.approach_weight_at
         self._weights = LossWeights(
             discount=config.discount,
             gae_lambda=config.gae_lambda,
@@ -70,6 +71,7 @@ class Differentiator:
         start: State,
         bank: GraphBank,
         tape: Tape | None = None,
+        version: int = 0,
     ) -> Loss:
         """Compute the gradient of a rollout that was acted on the parameters as they are.
 
@@ -80,11 +82,19 @@ class Differentiator:
             start: State before the first step.
             bank: The scene graphs that were used.
             tape: What acting has recorded of the steps; see `ActorCritic.unroll`.
+            version: Of the parameters; the weight of what is imitated depends on it.
         """
-        return self._descend(rollout, self._policy.unroll(observation, start, guidance, bank, tape), observation)
+        unrolled = self._policy.unroll(observation, start, guidance, bank, tape)
+        return self._descend(rollout, unrolled, observation, version)
 
     def off_policy(
-        self, behaviour: Behaviour, observation: Observation, guidance: Guidance, start: State, bank: GraphBank
+        self,
+        behaviour: Behaviour,
+        observation: Observation,
+        guidance: Guidance,
+        start: State,
+        bank: GraphBank,
+        version: int = 0,
     ) -> tuple[Loss, State]:
         """Compute the gradient of a rollout that was acted on other parameters.
 
@@ -94,6 +104,7 @@ class Differentiator:
             guidance: What was decided besides the actions, [T + 1, B].
             start: State before the first step.
             bank: The scene graphs that were used.
+            version: Of the parameters that acted; the weight of what is imitated depends on it.
 
         Returns:
             The loss, and the state of these parameters after the last step.
@@ -112,24 +123,26 @@ class Differentiator:
             values=unrolled.values.detach(),
             bootstrap=bootstrap,
         )
-        return self._descend(rollout, unrolled, seen), unrolled.state
+        return self._descend(rollout, unrolled, seen, version), unrolled.state
 
     @cached_property
     def _tape(self) -> Tape:
         """Memory for rollouts that were not recorded when they were acted."""
         return self._policy.tape(*self._size)
 
-    def _descend(self, rollout: Rollout, unrolled: Unrolled, observation: Observation) -> Loss:
+    def _descend(self, rollout: Rollout, unrolled: Unrolled, observation: Observation, version: int) -> Loss:
         """Compute the loss and its gradient, clipped."""
         scenes = torch.from_numpy(observation.scene)
+        weights = self._weights._replace(approach=self._approach_weight(version))
         loss = a3c_loss(
             rollout,
             unrolled.logits,
             unrolled.values,
-            self._weights,
+            weights,
             unrolled.scene_logits,
             scenes,
             unrolled.imitation,
+            unrolled.sighted,
         )
         self._parameters.gradients.zero_()
         loss.total.backward()  # type: ignore[no-untyped-call]

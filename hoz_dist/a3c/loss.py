@@ -24,6 +24,7 @@ class LossWeights(NamedTuple):
     entropy: float
     scene: float
     imitation: float = 0.0
+    approach: float = 0.0
 
 
 class Loss(NamedTuple):
@@ -35,6 +36,7 @@ class Loss(NamedTuple):
     entropy: float
     scene: float
     imitation: float = 0.0
+    approach: float = 0.0
 
     def terms(self) -> dict[str, float]:
         """Return the terms by the names that are reported: those that every method may have."""
@@ -54,6 +56,7 @@ def a3c_loss(
     scene_logits: Tensor | None = None,
     scenes: Tensor | None = None,
     imitation: Imitation | None = None,
+    sighted: Tensor | None = None,
 ) -> Loss:
     """Compute the loss of a rollout, averaged over the actions taken.
 
@@ -70,7 +73,9 @@ def a3c_loss(
         weights: Factors of the terms.
         scene_logits: Of the scene layer, [T, B, S], if it is on.
         scenes: True scenes, int64 [T, B], the labels of `scene_logits`.
-        imitation: What is to be taught the expert's actions, if anything is; the rollout then knows them.
+        imitation: What is to be taught the expert's actions besides, if anything is; the rollout then knows them.
+        sighted: Whether the target has been seen in the episode, bool [T, B]: there the policy is taught the expert's
+            actions, if the rollout knows them.
     """
     valid = rollout.valid.float()
     count = max(rollout.frames if rollout.taken is None else rollout.taken, 1)
@@ -93,15 +98,26 @@ def a3c_loss(
     if scene_logits is not None and scenes is not None:
         scene = functional.cross_entropy(scene_logits.flatten(0, 1), scenes.flatten())
         total = total + weights.scene * scene
-    imitated = torch.zeros(())
+    imitated = approached = torch.zeros(())
     if imitation is not None and rollout.expert is not None:
-        imitated = _cross_entropy(imitation, rollout.expert, rollout.valid) / count
+        taught = functional.log_softmax(imitation.logits, dim=-1)  # [T, B, K, 6]
+        counts = (imitation.counts & rollout.valid).unsqueeze(-1).expand(taught.shape[:-1])
+        imitated = _surprise(taught, rollout.expert.unsqueeze(2).expand_as(taught), counts) / count
         total = total + weights.imitation * imitated
-    return Loss(total, policy.item(), value.item(), entropy.item(), scene.item(), imitated.item())
+    if sighted is not None and rollout.expert is not None and weights.approach > 0.0:
+        approached = _surprise(log_probabilities, rollout.expert, sighted & rollout.valid) / count
+        total = total + weights.approach * approached
+    terms = (policy, value, entropy, scene, imitated, approached)
+    return Loss(total, *(term.item() for term in terms))
 
 
-def _cross_entropy(imitation: Imitation, expert: Tensor, valid: Tensor) -> Tensor:
-    """Return the sum of all policies' cross-entropies with the expert's actions over the steps that count, nats."""
-    counts = (imitation.counts & valid & (expert >= 0)).float()
-    chances = functional.log_softmax(imitation.logits, dim=-1).sum(dim=2)
-    return -(chances.gather(-1, expert.clamp(min=0).unsqueeze(-1)).squeeze(-1) * counts).sum()
+def _surprise(log_probabilities: Tensor, expert: Tensor, counts: Tensor) -> Tensor:
+    """Return the negative log-probability of doing any of what the expert might do, summed over steps, nats.
+
+    Args:
+        log_probabilities: Of the actions, [..., 6].
+        expert: Which of them the expert might take, bool [..., 6].
+        counts: At which steps, bool [...].
+    """
+    counts = counts & expert.any(dim=-1)
+    return -log_probabilities[counts].masked_fill(~expert[counts], -torch.inf).logsumexp(dim=-1).sum()

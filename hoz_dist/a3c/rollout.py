@@ -32,8 +32,8 @@ class Rollout:
     """Log-probabilities of the actions under the behaviour policy, float32 [T, B]; None if it is the policy that is
     differentiated."""
     expert: Tensor | None = None
-    """Action of a shortest path at each step, int64 [T, B], -1 where there is none: a label, never an input. None
-    unless the policy imitates."""
+    """Which actions begin a shortest path at each step, bool [T, B, 6]: labels, never inputs. None if nothing is
+    imitated."""
     taken: int | None = None
     """Number of actions taken, where not all of them are to be learnt from; None for those that are valid."""
 

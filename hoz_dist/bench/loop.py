@@ -55,7 +55,7 @@ def train_in_process(
     with Timings(timings, clock) as lines:
         while not stopped(0.0):
             with clock("load"):
-                collector.parameters.load(adam.parameters)
+                collector.load(adam.parameters, adam.updates)
             with clock("act"):
                 update = collector.roll_out()
             with clock("apply"):

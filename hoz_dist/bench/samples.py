@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from hoz_dist.graph.room_graph import RoomGraph
 from hoz_dist.graph.scene_graph import SceneGraph, merge_rooms
-from hoz_dist.nav.actions import NO_ACTION
+from hoz_dist.nav.actions import PREVIOUS_ACTIONS
 from hoz_dist.nav.categories import SCENES, TARGETS
 from hoz_dist.nav.observation import Observation
 from hoz_dist.nav.rooms import RoomId
@@ -31,7 +31,7 @@ def observations(settings: PolicySettings, *shape: int) -> Observation:
         detections=detections * seen,
         appearance=rng.random((*shape, len(TARGETS), settings.channels), dtype=np.float32) * seen,
         target=rng.integers(len(TARGETS), size=shape),
-        previous_action=rng.integers(NO_ACTION + 1, size=shape),
+        previous_action=rng.integers(PREVIOUS_ACTIONS, size=shape),
         scene=rng.integers(settings.scenes, size=shape),
         first=rng.random(shape) < FIRST_SHARE,
     )

@@ -15,7 +15,9 @@ if TYPE_CHECKING:
 
     from hoz_dist.bench.report import Metric, Report
 
-PRESETS: Final = ("compact", "paper")
+PRESETS: Final = ("compact", "medium", "paper")
+COMPARED: Final = ("compact", "paper")
+"""Presets that are measured when none is named: the least and the largest."""
 CODECS: Final = ("fp32", "bf16", "int8", "topk")
 
 repeats_option = click.option(
@@ -30,8 +32,8 @@ preset_option = click.option(
     "presets",
     type=click.Choice(PRESETS),
     multiple=True,
-    default=PRESETS,
-    show_default="both",
+    default=COMPARED,
+    show_default=True,
     help="Sizes of the network; may be repeated.",
 )
 compress_option = click.option(

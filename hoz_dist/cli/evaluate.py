@@ -27,6 +27,13 @@ from hoz_dist.nav.categories import SCENES
     multiple=True,
     help=f"Scene to evaluate in: {', '.join(SCENES)}; may be repeated.  [default: those that it was trained in]",
 )
+@click.option(
+    "--temperature",
+    type=click.FloatRange(0.01, 10.0),
+    default=0.5,
+    show_default=True,
+    help="Logits are divided by it before actions are drawn: 1 draws as in training, 0.01 takes the likeliest.",
+)
 @weights_option
 @cache_option
 @click.option("--live", is_flag=True, help="Render every step in PyBullet instead of looking it up; slow.")
@@ -38,6 +45,7 @@ def evaluate_command(
     seed: int,
     episodes: int,
     scenes: tuple[str, ...],
+    temperature: float,
     weights: Path | None,
     cache: Path | None,
     *,
@@ -60,6 +68,7 @@ def evaluate_command(
         seeds=range(seed, seed + trials),
         episodes=episodes,
         scenes=scenes,
+        temperature=temperature,
         weights=weights,
         cache=cache,
         live=live,

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from hoz_dist.cli.progress import Progress
 from hoz_dist.cli.rendering import Encoding, render_rooms
 from hoz_dist.errors import NotFoundError
-from hoz_dist.evaluation.agents import PolicyAgent
+from hoz_dist.evaluation.agents import TEMPERATURE, PolicyAgent
 from hoz_dist.evaluation.benchmark import Benchmark, Comparison, compare
 from hoz_dist.evaluation.loading import load_agent, matching_encoder
 from hoz_dist.evaluation.trials import stored_views
@@ -77,6 +77,7 @@ def measure(
     seeds: Sequence[int],
     episodes: int,
     scenes: Sequence[str] = (),
+    temperature: float = TEMPERATURE,
     weights: Path | None = None,
     cache: Path | None = None,
     live: bool = False,
@@ -89,6 +90,7 @@ def measure(
         seeds: Seed of each trial.
         episodes: Number of episodes in each scene.
         scenes: Scenes; those that the checkpoint was trained in when there are none.
+        temperature: By which logits are divided before actions are drawn.
         weights: Weights of the resnet18 encoder.
         cache: Folder of the view store; the default one when None.
         live: Render what the policy sees at every step, instead of looking it up.
@@ -101,7 +103,7 @@ def measure(
     # Results do not depend on the number of cores, and small products gain nothing from more threads.
     torch.set_num_threads(1)
     config = checkpoint.config
-    agent = load_agent(config, checkpoint.parameters, checkpoint.scene_graphs())
+    agent = load_agent(config, checkpoint.parameters, checkpoint.scene_graphs(), temperature)
     benchmark = open_benchmark(checkpoint, split=split, episodes=episodes, scenes=scenes, weights=weights, cache=cache)
     trials = 2 * len(seeds) + 1  # of Random and the policy; Oracle draws nothing and has one
     with Progress("Evaluating", len(benchmark.episodes) * trials, "episodes") as progress:

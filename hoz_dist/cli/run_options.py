@@ -34,12 +34,15 @@ _OPTIONS: Final = (
         "Visual Genome.  [default: counted in the training rooms]",
     ),
     click.option(
-        "--preset", default=RunConfig.preset, show_default=True, help="Sizes of the network: compact or paper."
+        "--preset",
+        default=RunConfig.preset,
+        show_default=True,
+        help="Sizes of the network: compact, medium (twice the LSTM) or paper.",
     ),
     click.option(
         "--precision",
         help="Of the LSTM's matrix products in training: fp32, or bf16, where the processor has it.  "
-        "[default: fp32 compact, bf16 paper]",
+        "[default: fp32; bf16 with paper]",
     ),
     click.option("--encoder", default=RunConfig.encoder, show_default=True, help="Visual encoder: pooled or resnet18."),
     weights_option,
@@ -59,8 +62,21 @@ _OPTIONS: Final = (
     click.option(
         "--learning-rate",
         type=float,
-        help="Adam's step size at the start; falls linearly to 0 over the budget.  "
-        "[default: 0.001 compact, 0.0001 paper]",
+        help="Adam's step size at the start; falls linearly to 0 over the budget.  [default: 0.001; 0.0001 with paper]",
+    ),
+    click.option(
+        "--approach-weight",
+        type=float,
+        default=RunConfig.approach_weight,
+        show_default=True,
+        help="Weight at the start of imitating shortest paths, in training, once the target was seen; 0 for none.",
+    ),
+    click.option(
+        "--approach-frames",
+        type=int,
+        default=RunConfig.approach_frames,
+        show_default=True,
+        help="Frames over which that weight falls linearly to 0.",
     ),
     click.option(
         "--learn-from",

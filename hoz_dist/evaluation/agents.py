@@ -1,6 +1,6 @@
 """The agents that can be evaluated: a trained policy, the floor (Random) and the ceiling (Oracle)."""
 
-from typing import NamedTuple, Protocol
+from typing import Final, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,9 @@ from hoz_dist.policy.sampling import sample_actions
 from hoz_dist.sim.episode_runner import EpisodeRunner
 from hoz_dist.sim.expert import expert_actions
 from hoz_dist.sim.room_views import RoomViews
+
+TEMPERATURE: Final = 0.5
+"""By which a tested policy's logits are divided: exploring is for training; see docs/decisions/recipe.md."""
 
 
 class ZonePlan(NamedTuple):
@@ -87,17 +90,19 @@ class OracleAgent:
 class PolicyAgent:
     """Samples from a trained policy."""
 
-    def __init__(self, name: str, policy: ActorCritic, bank: GraphBank) -> None:
+    def __init__(self, name: str, policy: ActorCritic, bank: GraphBank, temperature: float = TEMPERATURE) -> None:
         """Take a policy.
 
         Args:
             name: Its method.
             policy: The network.
             bank: The scene graphs that it is guided by.
+            temperature: By which logits are divided before actions are drawn.
         """
         self.name = name
         self._policy = policy
         self._bank = bank
+        self._temperature = temperature
 
     def begin(self, runner: EpisodeRunner, rng: np.random.Generator) -> None:
         """Prepare for the episodes of a runner."""
@@ -109,7 +114,7 @@ class PolicyAgent:
         """Choose an action for each episode, [B]."""
         decision = self._policy.act(runner.observe(), self._state, self._bank)
         self._state, self._decision = decision.state, decision
-        return sample_actions(decision.logits, self._rng).numpy()
+        return sample_actions(decision.logits, self._rng, self._temperature).numpy()
 
     def zone_plan(self) -> ZonePlan | None:
         """Return what guided the last actions, [B]; None before the first ones and without the zone layer."""

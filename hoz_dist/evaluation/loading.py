@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from hoz_dist.config import RunConfig
 from hoz_dist.errors import DamagedFileError, InvalidValueError, NotFoundError
-from hoz_dist.evaluation.agents import PolicyAgent
+from hoz_dist.evaluation.agents import TEMPERATURE, PolicyAgent
 from hoz_dist.graph.scene_graph import SceneGraph
 from hoz_dist.nav.encoder import VisualEncoder
 from hoz_dist.policy.encoders import load_encoder
@@ -16,13 +16,19 @@ from hoz_dist.policy.graph_bank import GraphBank
 from hoz_dist.policy.parameters import FlatParameters, make_policy
 
 
-def load_agent(config: RunConfig, parameters: NDArray[np.float32], graphs: Mapping[str, SceneGraph]) -> PolicyAgent:
+def load_agent(
+    config: RunConfig,
+    parameters: NDArray[np.float32],
+    graphs: Mapping[str, SceneGraph],
+    temperature: float = TEMPERATURE,
+) -> PolicyAgent:
     """Make the agent that a checkpoint holds.
 
     Args:
         config: Configuration of the run.
         parameters: [P].
         graphs: Scene graphs, by scene.
+        temperature: By which logits are divided before actions are drawn.
 
     Raises:
         DamagedFileError: The parameters are not those of the configuration's network.
@@ -38,7 +44,7 @@ def load_agent(config: RunConfig, parameters: NDArray[np.float32], graphs: Mappi
         message = "The checkpoint holds no scene graph, so its agent has nothing to be guided by; train longer."
         raise NotFoundError(message)
     bank = GraphBank.of(graphs, config.zones, config.edge_cost, config.subgoal)
-    return PolicyAgent(config.method, policy.eval(), bank)
+    return PolicyAgent(config.method, policy.eval(), bank, temperature)
 
 
 def matching_encoder(config: RunConfig, weights: Path | None) -> VisualEncoder:

@@ -11,7 +11,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from hoz_dist.nav.actions import NO_ACTION, Action
+from hoz_dist.nav.actions import PREVIOUS_ACTIONS, Action
 from hoz_dist.nav.categories import TARGETS
 from hoz_dist.nav.observation import Observation
 from hoz_dist.policy.branches import BRANCHES
@@ -35,6 +35,8 @@ class State(NamedTuple):
     """Local copy of the scene graph; empty without the zone layer."""
     memory: Memory = ()
     """What the steering remembers of the episodes; empty without one."""
+    sighted: Tensor = torch.empty(0, dtype=torch.bool)
+    """Whether the target has been seen in the episode, bool [B]; decides what is taught, and is no input."""
 
 
 class Decision(NamedTuple):
@@ -62,7 +64,9 @@ class Unrolled(NamedTuple):
     state: State
     """State after the rollout's last step, without gradient."""
     imitation: Imitation | None
-    """What is to be taught the expert's action, if anything is."""
+    """What else is to be taught the expert's action, if anything is."""
+    sighted: Tensor
+    """Whether the target has been seen in the episode, bool [T, B]."""
 
 
 class _Inputs(NamedTuple):
@@ -97,6 +101,11 @@ class _Inputs(NamedTuple):
         """f, the bag of objects seen, [B, N]."""
         return (self.confidence > 0).float()
 
+    @property
+    def sees_target(self) -> Tensor:
+        """Whether the target is seen, bool [B]."""
+        return (self.confidence * self.target).sum(dim=-1) > 0
+
 
 class ActorCritic(nn.Module):
     """Policy and value function.
@@ -116,7 +125,7 @@ class ActorCritic(nn.Module):
         context += sizes.zones * settings.zone_layer + settings.scenes * settings.scene_layer
         context += sum(shape) if maps is None else 0
         self.target_embedding = nn.Linear(categories, sizes.target)
-        self.action_embedding = nn.Embedding(NO_ACTION + 1, sizes.action)
+        self.action_embedding = nn.Embedding(PREVIOUS_ACTIONS, sizes.action)
         self.trunk = make_trunk(settings, context, maps)
         self.object_branch = None if branch is None else branch.make(settings)
         self.scene_layer = (
@@ -142,7 +151,12 @@ class ActorCritic(nn.Module):
     def initial_state(self, batch: int) -> State:
         """Return the state before any episode's first step."""
         memory = () if self.steering is None else self.steering.initial_memory(batch)
-        return State(self.lstm.initial_state(batch), initial_zone_state(batch, self.settings.zones), memory)
+        return State(
+            self.lstm.initial_state(batch),
+            initial_zone_state(batch, self.settings.zones),
+            memory,
+            torch.zeros(batch, dtype=torch.bool),
+        )
 
     def tape(self, steps: int, batch: int) -> Tape:
         """Return an empty tape for T steps of B episodes."""
@@ -178,7 +192,8 @@ class ActorCritic(nn.Module):
         if self.steering is not None:
             steered = self._steer(logits, outputs, picture, inputs, first.unsqueeze(0), memory)
             logits, memory = steered.logits.squeeze(0), steered.memory
-        return Decision(logits, value, State(tape.state, zone, memory), guidance)
+        sighted = inputs.sees_target | (state.sighted & ~first)
+        return Decision(logits, value, State(tape.state, zone, memory, sighted), guidance)
 
     def unroll(
         self, observation: Observation, state: State, guidance: Guidance, bank: GraphBank, tape: Tape | None = None
@@ -215,12 +230,14 @@ class ActorCritic(nn.Module):
         steered = Steered(logits.view(steps, batch, -1), state.memory)
         if self.steering is not None:
             steered = self._steer(logits, outputs, picture, inputs, first, state.memory)
+        sighted = _ever(inputs.sees_target.view(steps, batch), first, state.sighted)
         return Unrolled(
             logits=steered.logits,
             values=values.view(steps, batch),
             scene_logits=None if scene_logits is None else scene_logits.view(steps, batch, -1),
-            state=State(tape.state, zone, tuple(part.detach() for part in steered.memory)),
+            state=State(tape.state, zone, tuple(part.detach() for part in steered.memory), sighted[-1]),
             imitation=steered.imitation,
+            sighted=sighted,
         )
 
     def _scene_logits(self, picture: Tensor, inputs: _Inputs) -> Tensor | None:
@@ -295,6 +312,21 @@ class ActorCritic(nn.Module):
 
 _MAPS: Final = 2
 """Axes of an object branch's maps of one picture; a vector has one."""
+
+
+def _ever(now: Tensor, first: Tensor, before: Tensor) -> Tensor:
+    """Return whether something was true at any step of the episode so far, [T, B].
+
+    Args:
+        now: Whether it is true at a step, bool [T, B].
+        first: Whether the step begins an episode, bool [T, B].
+        before: Whether it was ever before the first step, bool [B].
+    """
+    over_time = []
+    for here, begins in zip(now, first, strict=True):
+        before = here | (before & ~begins)
+        over_time.append(before)
+    return torch.stack(over_time)
 
 
 def _products_in(dtype: torch.dtype) -> torch.autocast:

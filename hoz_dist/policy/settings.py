@@ -7,7 +7,7 @@ from hoz_dist.nav.categories import ROOM_SCENES
 from hoz_dist.policy.methods import METHODS
 from hoz_dist.policy.methods.description import Layer, Method
 
-Preset = Literal["compact", "paper"]
+Preset = Literal["compact", "medium", "paper"]
 EncoderName = Literal["pooled", "resnet18"]
 Precision = Literal["fp32", "bf16"]
 """Of the products over rollouts, most of the arithmetic: their factors and results, and the maps of the trunk.
@@ -59,6 +59,21 @@ PRESETS: Final[dict[Preset, Sizes]] = {
         tentative=32,
         zones=32,
         lstm=128,
+        lstm_layers=1,
+    ),
+    "medium": Sizes(
+        trunk="vector",
+        picture=64,
+        target=16,
+        action=8,
+        objects=16,
+        prior_nodes=32,
+        prior=32,
+        relation_hidden=16,
+        relation=4,
+        tentative=32,
+        zones=32,
+        lstm=256,
         lstm_layers=1,
     ),
     "paper": Sizes(

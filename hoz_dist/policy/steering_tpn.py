@@ -31,7 +31,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from hoz_dist.nav.actions import NO_ACTION, Action
+from hoz_dist.nav.actions import PREVIOUS_ACTIONS, Action
 from hoz_dist.policy.fast_weights import change_of_logits, steps_before
 from hoz_dist.policy.settings import PolicySettings
 from hoz_dist.policy.steering import Imitation, Memory, Moment, Steered, Steering
@@ -64,7 +64,7 @@ class TentativePolicy(Steering):
         sizes = settings.sizes
         self._outputs, self._features = sizes.lstm, sizes.tentative
         self.state = nn.Linear(sizes.lstm, sizes.tentative)
-        self.hidden = nn.Linear(2 * sizes.tentative + NO_ACTION + 1, 2 * sizes.tentative)
+        self.hidden = nn.Linear(2 * sizes.tentative + PREVIOUS_ACTIONS, 2 * sizes.tentative)
         self.propose = nn.Linear(2 * sizes.tentative, len(Action))
         self.log_step_size = nn.Parameter(torch.tensor(math.log(FIRST_STEP_SIZE / sizes.lstm)))
         # Not learnt: a view keeps its key when the parameters change, which they do within episodes.
@@ -86,7 +86,7 @@ class TentativePolicy(Steering):
             torch.zeros(batch, dtype=torch.int64),
             torch.zeros(batch, REMEMBERED, KEY),
             torch.zeros(batch, REMEMBERED, self._features),
-            torch.zeros(batch, REMEMBERED, NO_ACTION + 1),
+            torch.zeros(batch, REMEMBERED, PREVIOUS_ACTIONS),
             torch.zeros(batch, len(Action), self._outputs),
         )
 
@@ -98,7 +98,7 @@ class TentativePolicy(Steering):
         outputs = moment.outputs.detach()
         keys = torch.cat([keys, self._keys(moment.features).transpose(0, 1)], dim=1)
         states = torch.cat([states, functional.relu(self.state(outputs)).transpose(0, 1)], dim=1)
-        actions = torch.cat([actions, functional.one_hot(moment.previous_action.t(), NO_ACTION + 1).float()], dim=1)
+        actions = torch.cat([actions, functional.one_hot(moment.previous_action.t(), PREVIOUS_ACTIONS).float()], dim=1)
         remembered = _remembered(steps)
         stuck = (remembered & _alike(keys)).any(dim=-1)
         proposed = self._propose(states, actions, remembered).transpose(0, 1)

@@ -63,7 +63,7 @@ def measure(config: RunConfig, rooms: Sequence[RoomId], store: ViewStore, episod
     def update() -> int:
         made = collector.roll_out()
         adam.step(made.gradient)
-        collector.parameters.load(adam.parameters)
+        collector.load(adam.parameters, adam.updates)
         return made.frames
 
     for _ in range(WARM_UP_UPDATES):

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hoz_dist.nav.actions import NO_ACTION, Action
+from hoz_dist.nav.actions import NO_ACTION, Action, felt
 from hoz_dist.nav.categories import scene_index
 from hoz_dist.nav.episode import Episode, EpisodeResult, evaluation_cap
 from hoz_dist.nav.observation import Observation
@@ -101,8 +101,8 @@ class EpisodeBatch:
         if done.size:
             reward[done] += SUCCESS_REWARD * self._source.succeeds(self.views[done], self._target[done])
         after = self._transitions.pick(self.views, actions)
+        np.copyto(self._previous, felt(actions, after == self.views), where=active)
         np.copyto(self.views, after, where=active)
-        np.copyto(self._previous, actions, where=active)
         self._actions += active
         self._moves += active & (actions == Action.MOVE_AHEAD)
         truncated = active & ~terminated & (self._actions >= self._cap)

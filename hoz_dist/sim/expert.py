@@ -1,4 +1,6 @@
-"""The expert: an action of a shortest path, for every view of a room and every target."""
+"""The expert: the actions that begin a shortest path, for every view of a room and every target."""
+
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -7,14 +9,29 @@ from hoz_dist.nav.actions import Action
 from hoz_dist.sim.room_views import RoomViews
 from hoz_dist.sim.row_table import RowTable
 
-NO_PATH = -1
+NO_PATH: Final = -1
 """In place of an action where no view can be reached that would succeed."""
 
 
-def expert_actions(views: RoomViews) -> NDArray[np.int8]:
-    """Return the expert's action for every view and target.
+def shortest_actions(views: RoomViews) -> NDArray[np.bool_]:
+    """Return the actions that begin a shortest path from every view to every target: Done where it would succeed.
 
-    Done where it would succeed, else the first of the actions that lead one step nearer.
+    Args:
+        views: The room.
+
+    Returns:
+        Whether each action does, [V, N, 6]; none does where there is no path.
+    """
+    here = views.optimal
+    actions = np.zeros((*here.shape, len(Action)), bool)
+    nearer = here[views.graph.transitions[:, : Action.DONE]] == here[:, np.newaxis] - 1  # [V, 5, N]
+    actions[..., : Action.DONE] = nearer.transpose(0, 2, 1) & (here > 0)[..., np.newaxis]
+    actions[..., Action.DONE] = here == 0
+    return actions
+
+
+def expert_actions(views: RoomViews) -> NDArray[np.int8]:
+    """Return one action for every view and target: the first of those that begin a shortest path.
 
     Args:
         views: The room.
@@ -22,12 +39,10 @@ def expert_actions(views: RoomViews) -> NDArray[np.int8]:
     Returns:
         Actions, [V, N]; `NO_PATH` where there is none.
     """
-    here = views.optimal
-    nearer = here[views.graph.transitions[:, : Action.DONE]] == here[:, np.newaxis] - 1  # [V, 5, N]
-    actions: NDArray[np.int8] = nearer.argmax(axis=1).astype(np.int8)
-    actions[here == 0] = Action.DONE
-    actions[here < 0] = NO_PATH
-    return actions
+    actions = shortest_actions(views)
+    first: NDArray[np.int8] = actions.argmax(axis=-1).astype(np.int8)
+    first[~actions.any(axis=-1)] = NO_PATH
+    return first
 
 
 class ExpertTable:
@@ -37,13 +52,15 @@ class ExpertTable:
         """Make a table without rooms."""
         self.rooms = 0
         """Number of rooms."""
-        self._actions: RowTable[np.int8] = RowTable()
+        self._bits: RowTable[np.uint8] = RowTable()
+        """An action's bit is set if it begins a shortest path."""
 
     def add_room(self, views: RoomViews) -> None:
         """Append the views of a room."""
-        self._actions.append(expert_actions(views))
+        self._bits.append(np.packbits(shortest_actions(views), axis=-1, bitorder="little")[..., 0])
         self.rooms += 1
 
-    def look_up(self, views: NDArray[np.int64], targets: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Return the expert's actions at views [...] with targets [...], in their shape; `NO_PATH` where none is."""
-        return self._actions.pick(views.ravel(), targets.ravel()).astype(np.int64).reshape(views.shape)
+    def look_up(self, views: NDArray[np.int64], targets: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Return which actions begin a shortest path from views [...] to targets [...], [..., 6]."""
+        bits = self._bits.pick(views.ravel(), targets.ravel()).reshape(*views.shape, 1)
+        return np.unpackbits(bits, axis=-1, count=len(Action), bitorder="little").astype(bool)

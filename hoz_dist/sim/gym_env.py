@@ -12,7 +12,7 @@ from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
 from hoz_dist.errors import InvalidValueError, UnknownNameError
-from hoz_dist.nav.actions import NO_ACTION, Action
+from hoz_dist.nav.actions import NO_ACTION, PREVIOUS_ACTIONS, Action, felt
 from hoz_dist.nav.categories import TARGETS, category_index
 from hoz_dist.nav.episode import Episode, evaluation_cap
 from hoz_dist.nav.pose import PICTURE_SIZE
@@ -180,7 +180,7 @@ class ObjectNavEnv(gymnasium.Env[dict[str, Any], np.int64]):
                 "depth": spaces.Box(0.0, FARTHEST_M, picture, np.float32),
                 "detections": spaces.Box(0.0, 1.0, (len(TARGETS), 5), np.float32),
                 "target": spaces.Discrete(len(TARGETS)),
-                "previous_action": spaces.Discrete(len(Action) + 1),
+                "previous_action": spaces.Discrete(PREVIOUS_ACTIONS),
             }
         )
 
@@ -227,9 +227,9 @@ class ObjectNavEnv(gymnasium.Env[dict[str, Any], np.int64]):
         if not self.action_space.contains(action):
             message = f"Action {action!r} is not one of 0 to {len(Action) - 1}."
             raise InvalidValueError(message)
-        self._view = int(self._views.graph.transitions[self._view, action])
+        before, self._view = self._view, int(self._views.graph.transitions[self._view, action])
         self._actions += 1
-        self._previous_action = int(action)
+        self._previous_action = int(felt(np.asarray(action), np.asarray(self._view == before)))
         view = self._look()
         terminated = int(action) == Action.DONE
         success = terminated and bool(view.success[episode.target])

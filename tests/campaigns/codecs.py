@@ -59,7 +59,7 @@ def train(config: RunConfig, rooms: Sequence[RoomId], actors: int, updates: int)
             adam.set_progress(update / updates)
             adam.step(decompressor.decompress(sent, lag_weight(actors - 1)).vector)
         actor = update % actors
-        collectors[actor].parameters.load(adam.parameters)
+        collectors[actor].load(adam.parameters, adam.updates)
         rollout = collectors[actor].roll_out()
         waiting.append((actor, max(update - actors, 0), rollout.gradient.copy()))
         ended += [result.success for result in rollout.finished]

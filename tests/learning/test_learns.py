@@ -77,7 +77,7 @@ def train(config: RunConfig, updates: int) -> tuple[float, NDArray[np.float32]]:
     optimizer = FlatAdam(initial_parameters(config.policy, config.seed), config.learning_rate)
     ended: list[bool] = []
     for _ in range(updates):
-        collector.parameters.load(optimizer.parameters)
+        collector.load(optimizer.parameters, optimizer.updates)
         update = collector.roll_out()
         optimizer.step(update.gradient)
         ended += [result.success for result in update.finished]

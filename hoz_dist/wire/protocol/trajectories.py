@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoz_dist.graph.checks import MAX_ZONES
-from hoz_dist.nav.actions import NO_ACTION, Action
+from hoz_dist.nav.actions import NO_ACTION, PREVIOUS_ACTIONS, Action
 from hoz_dist.nav.categories import SCENES, TARGETS
 from hoz_dist.nav.reward import STEP_REWARD, SUCCESS_REWARD
 from hoz_dist.nav.rooms import RoomId
@@ -52,7 +52,7 @@ _FLAGS: Final = Tensor("uint8", rank=2, most=_MOST, high=sum(Flag))
 _SCENE: Final = Tensor("uint8", rank=2, most=_MOST, high=len(SCENES) - 1)
 _ZONE: Final = Tensor("uint8", rank=2, most=_MOST, high=MAX_ZONES - 1)
 _ACTION: Final = Tensor("uint8", rank=2, most=_MOST, high=len(Action) - 1)
-_PREVIOUS: Final = Tensor("uint8", rank=1, most=_MOST, high=NO_ACTION)
+_PREVIOUS: Final = Tensor("uint8", rank=1, most=_MOST, high=PREVIOUS_ACTIONS - 1)
 _REWARD: Final = Tensor("float32", rank=2, most=_MOST, low=STEP_REWARD, high=SUCCESS_REWARD)
 _LOG_PROBABILITY: Final = Tensor("float32", rank=2, most=_MOST, high=0.0)
 

@@ -88,8 +88,8 @@ def test_without_lag_a_run_goes_as_one_that_learns_from_gradients() -> None:
     by_rollouts, by_gradients = new_core(), new_core(replace(ROLLOUTS, learn_from="gradients"))
     actor, other = make_collector(ROLLOUTS), make_collector(ROLLOUTS)
     for version in range(3):
-        actor.parameters.load(by_rollouts.parameters)
-        other.parameters.load(by_rollouts.parameters)
+        actor.load(by_rollouts.parameters, by_rollouts.version)
+        other.load(by_rollouts.parameters, by_rollouts.version)
         answer(by_rollouts, TrajectoryReceived(0, rollout(actor, version, version)))
         update = other.roll_out()
         push = GradientPush("a", 1, version, 1, version, update.frames, update.gradient)

@@ -91,7 +91,7 @@ def test_without_lag_the_gradients_are_the_actors_own(method: Method) -> None:
     graphs = USED if method == "hoz" else ()
     for sequence in range(5):
         for collector in (differentiating, recording):
-            collector.parameters.load(adam.parameters)
+            collector.load(adam.parameters, sequence)
         update, trajectory = differentiating.roll_out(), recording.record()
         learnt = gradients.learn(push_of(trajectory, sequence, graphs))
         assert learnt.frames == update.frames == trajectory.frames
@@ -109,7 +109,7 @@ def test_the_learner_knows_the_experts_actions_and_the_steerings_memory(monkeypa
     differentiating, recording = (make_collector(config, *ROOMS, max_actions=LONG) for _ in range(2))
     for sequence in range(3):
         for collector in (differentiating, recording):
-            collector.parameters.load(adam.parameters)
+            collector.load(adam.parameters, sequence)
         update, trajectory = differentiating.roll_out(), recording.record()
         learnt = gradients.learn(push_of(trajectory, sequence, ()))
         assert learnt.loss is not None

@@ -4,7 +4,7 @@ import numpy as np
 
 from hoz_dist.graph.room_graph import RoomGraph
 from hoz_dist.graph.scene_graph import SceneGraph, merge_rooms
-from hoz_dist.nav.actions import NO_ACTION
+from hoz_dist.nav.actions import PREVIOUS_ACTIONS
 from hoz_dist.nav.categories import ROOM_SCENES, SCENES, TARGETS
 from hoz_dist.nav.observation import Observation
 
@@ -28,7 +28,7 @@ def make_observation(*shape: int, seed: int = 0) -> Observation:
             np.float32
         ),
         target=rng.integers(categories, size=shape),
-        previous_action=rng.integers(NO_ACTION + 1, size=shape),
+        previous_action=rng.integers(PREVIOUS_ACTIONS, size=shape),
         scene=rng.integers(len(ROOM_SCENES), size=shape),
         first=first,
     )
