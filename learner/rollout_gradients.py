@@ -21,8 +21,9 @@ from hoz_dist.a3c.norm import gradient_norm
 from hoz_dist.config import RunConfig
 from hoz_dist.gradient_forms import Vector
 from hoz_dist.graph.scene_graph import SceneGraph
-from hoz_dist.nav.actions import NO_ACTION, felt
+from hoz_dist.nav.actions import NO_ACTION
 from hoz_dist.nav.categories import SCENES, scene_index
+from hoz_dist.nav.feedback import felt
 from hoz_dist.nav.observation import Observation
 from hoz_dist.nav.rooms import RoomId
 from hoz_dist.policy.graph_bank import GraphBank

@@ -5,8 +5,8 @@ from numpy.typing import NDArray
 
 from hoz_dist.graph.room_graph import RoomGraph
 from hoz_dist.graph.scene_graph import SceneGraph, merge_rooms
-from hoz_dist.nav.actions import PREVIOUS_ACTIONS
 from hoz_dist.nav.categories import SCENES, TARGETS
+from hoz_dist.nav.feedback import PREVIOUS_ACTIONS
 from hoz_dist.nav.observation import Observation
 from hoz_dist.nav.rooms import RoomId
 from hoz_dist.policy.graph_bank import GraphBank

@@ -1,10 +1,6 @@
-"""The six actions, in the released order, and what an agent feels of the last one."""
+"""The six actions, in the released order."""
 
 from enum import IntEnum
-from typing import Final
-
-import numpy as np
-from numpy.typing import NDArray
 
 
 class Action(IntEnum):
@@ -18,25 +14,5 @@ class Action(IntEnum):
     DONE = 5
 
 
-NO_ACTION: Final = len(Action)
+NO_ACTION = len(Action)
 """Index of "no previous action", used at the first step of an episode."""
-FAILED_MOVE: Final = NO_ACTION + 1
-"""Previous action: MoveAhead that left the agent where it was, as something is in the way."""
-FAILED_LOOK: Final = NO_ACTION + 2
-"""Previous action: LookUp or LookDown that left the camera as it was, as it goes no further."""
-PREVIOUS_ACTIONS: Final = NO_ACTION + 3
-"""Number of values of a previous action."""
-
-
-def felt(actions: NDArray[np.int64], stayed: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Return actions as the agent knows them at the next step: whether they failed, too.
-
-    An agent that sees the same picture as before could tell by itself; a robot has bumpers, AI2-THOR
-    ``lastActionSuccess``.
-
-    Args:
-        actions: Index of an `Action`, [B].
-        stayed: Whether the agent sees what it saw before, [B].
-    """
-    failed = np.where(actions == Action.MOVE_AHEAD, FAILED_MOVE, FAILED_LOOK)
-    return np.where(stayed & (actions != Action.DONE), failed, actions)

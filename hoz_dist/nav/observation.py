@@ -18,7 +18,7 @@ class Observation(NamedTuple):
     target: NDArray[np.int64]
     """Target category, [B]."""
     previous_action: NDArray[np.int64]
-    """Action taken at the step before, as it was `hoz_dist.nav.actions.felt`, [B]; ``NO_ACTION`` at the first step."""
+    """Action taken at the step before, as it was `hoz_dist.nav.feedback.felt`, [B]; ``NO_ACTION`` at the first step."""
     scene: NDArray[np.int64]
     """True scene, [B]: label of the scene layer, never an input of a policy."""
     first: NDArray[np.bool_]

@@ -11,8 +11,9 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from hoz_dist.nav.actions import PREVIOUS_ACTIONS, Action
+from hoz_dist.nav.actions import Action
 from hoz_dist.nav.categories import TARGETS
+from hoz_dist.nav.feedback import PREVIOUS_ACTIONS
 from hoz_dist.nav.observation import Observation
 from hoz_dist.policy.branches import BRANCHES
 from hoz_dist.policy.graph_bank import GraphBank

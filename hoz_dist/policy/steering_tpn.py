@@ -31,7 +31,8 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from hoz_dist.nav.actions import PREVIOUS_ACTIONS, Action
+from hoz_dist.nav.actions import Action
+from hoz_dist.nav.feedback import PREVIOUS_ACTIONS
 from hoz_dist.policy.fast_weights import change_of_logits, steps_before
 from hoz_dist.policy.settings import PolicySettings
 from hoz_dist.policy.steering import Imitation, Memory, Moment, Steered, Steering

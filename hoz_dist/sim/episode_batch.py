@@ -5,9 +5,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hoz_dist.nav.actions import NO_ACTION, Action, felt
+from hoz_dist.nav.actions import NO_ACTION, Action
 from hoz_dist.nav.categories import scene_index
 from hoz_dist.nav.episode import Episode, EpisodeResult, evaluation_cap
+from hoz_dist.nav.feedback import felt
 from hoz_dist.nav.observation import Observation
 from hoz_dist.nav.reward import STEP_REWARD, SUCCESS_REWARD
 from hoz_dist.sim.room_views import RoomViews

@@ -12,9 +12,10 @@ from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
 from hoz_dist.errors import InvalidValueError, UnknownNameError
-from hoz_dist.nav.actions import NO_ACTION, PREVIOUS_ACTIONS, Action, felt
+from hoz_dist.nav.actions import NO_ACTION, Action
 from hoz_dist.nav.categories import TARGETS, category_index
 from hoz_dist.nav.episode import Episode, evaluation_cap
+from hoz_dist.nav.feedback import PREVIOUS_ACTIONS, felt
 from hoz_dist.nav.pose import PICTURE_SIZE
 from hoz_dist.nav.reward import STEP_REWARD, SUCCESS_REWARD
 from hoz_dist.nav.rooms import RoomId, Split, rooms_of

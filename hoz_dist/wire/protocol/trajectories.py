@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoz_dist.graph.checks import MAX_ZONES
-from hoz_dist.nav.actions import NO_ACTION, PREVIOUS_ACTIONS, Action
+from hoz_dist.nav.actions import NO_ACTION, Action
 from hoz_dist.nav.categories import SCENES, TARGETS
+from hoz_dist.nav.feedback import PREVIOUS_ACTIONS
 from hoz_dist.nav.reward import STEP_REWARD, SUCCESS_REWARD
 from hoz_dist.nav.rooms import RoomId
 from hoz_dist.wire.protocol.message import MAX_FRAMES, ROOM, ROOM_DIGEST, SCENE, SMALL_BYTES

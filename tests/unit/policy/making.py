@@ -4,8 +4,8 @@ import numpy as np
 
 from hoz_dist.graph.room_graph import RoomGraph
 from hoz_dist.graph.scene_graph import SceneGraph, merge_rooms
-from hoz_dist.nav.actions import PREVIOUS_ACTIONS
 from hoz_dist.nav.categories import ROOM_SCENES, SCENES, TARGETS
+from hoz_dist.nav.feedback import PREVIOUS_ACTIONS
 from hoz_dist.nav.observation import Observation
 
 CHANNELS = 6
