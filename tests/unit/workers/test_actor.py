@@ -35,7 +35,7 @@ class FakeLink:
         self._answer = answer
 
     def parameters(self, *_: Any) -> Any:
-        return SimpleNamespace(head=SimpleNamespace(epoch=1, stamp=(1, 0)), vector=FINITE)
+        return SimpleNamespace(head=SimpleNamespace(epoch=1, version=0, stamp=(1, 0)), vector=FINITE)
 
     def scene_graphs(self) -> dict[str, Any]:
         return {}
@@ -55,9 +55,11 @@ class FakeRollouts:
     """Ends the actor's work after some rollouts."""
 
     def __init__(self, stop: threading.Event, rollouts: int, gradient: Any, episodes: int) -> None:
-        self.parameters = SimpleNamespace(load=lambda *_: None)
         self._stop, self._left = stop, rollouts
         self._update = Update(gradient, 20, LOSS, [EPISODE] * episodes)
+
+    def load(self, *_: Any) -> None:
+        pass
 
     def roll_out(self) -> Update:
         self._left -= 1

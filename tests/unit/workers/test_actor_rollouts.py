@@ -41,9 +41,8 @@ class FakeLearner:
 
     def parameters(self, at_least: tuple[int, int] | None) -> Any:
         self.asked.append(at_least)
-        return SimpleNamespace(
-            head=SimpleNamespace(epoch=self.epoch, stamp=(self.epoch, self.version)), vector=self._vector
-        )
+        head = SimpleNamespace(epoch=self.epoch, version=self.version, stamp=(self.epoch, self.version))
+        return SimpleNamespace(head=head, vector=self._vector)
 
     def scene_graphs(self) -> dict[str, Any]:
         return self.served
