@@ -15,6 +15,7 @@ from gymnasium.vector import AutoresetMode
 from hoz_dist.errors import HozError
 from hoz_dist.nav.actions import NO_ACTION, Action
 from hoz_dist.nav.categories import TARGETS
+from hoz_dist.nav.feedback import FAILED_LOOK, FAILED_MOVE
 from hoz_dist.nav.rooms import RoomId
 from hoz_dist.sim.gym_env import NoFeatures, ObjectNavEnv
 from hoz_dist.sim.registration import ENVIRONMENT_ID, register
@@ -89,6 +90,23 @@ def test_the_cap_truncates_and_a_failed_done_terminates(cache: Path) -> None:
     env.reset()
     _, reward, terminated, truncated, info = env.step(np.int64(Action.DONE))
     assert (reward, terminated, truncated, info["success"]) == (-0.01, True, False, False)
+    env.close()
+
+
+def test_what_fails_is_felt(cache: Path) -> None:
+    env = make(cache, max_actions=200)
+    rng = np.random.default_rng(0)
+    _, info = env.reset(seed=0)
+    failed = {Action.MOVE_AHEAD: FAILED_MOVE, Action.LOOK_UP: FAILED_LOOK, Action.LOOK_DOWN: FAILED_LOOK}
+    felt = set()
+    for action in rng.choice(5, size=100, p=[0.4, 0.2, 0.2, 0.1, 0.1]):
+        before = info["pose"]
+        observation, *_, info = env.step(action)
+        expected = failed[Action(action)] if info["pose"] == before else action
+        assert observation["previous_action"] == expected
+        assert env.observation_space.contains(observation)
+        felt.add(int(expected))
+    assert felt == {*range(5), FAILED_MOVE, FAILED_LOOK}
     env.close()
 
 

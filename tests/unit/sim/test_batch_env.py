@@ -6,6 +6,7 @@ from hoz_dist.errors import InvalidValueError
 from hoz_dist.nav.actions import NO_ACTION, Action
 from hoz_dist.nav.categories import TARGETS
 from hoz_dist.nav.episode import EpisodeResult
+from hoz_dist.nav.feedback import FAILED_LOOK, FAILED_MOVE
 from hoz_dist.nav.rooms import RoomId
 from hoz_dist.sim.batch_env import BatchEnv
 from hoz_dist.sim.room_views import RoomViews
@@ -13,6 +14,12 @@ from tests.unit.sim.making import open_grid, random_views, views_of
 
 ROOMS = [random_views(RoomId("kitchen", 1), seed=1), random_views(RoomId("bathroom", 2), seed=2, width=3)]
 OFFSETS = [0, ROOMS[0].graph.views]
+FAILURES: dict[int, int] = {
+    Action.MOVE_AHEAD: FAILED_MOVE,
+    Action.LOOK_UP: FAILED_LOOK,
+    Action.LOOK_DOWN: FAILED_LOOK,
+}
+"""What is felt of an action that changes nothing. Done is none that could fail so."""
 
 
 def make(batch: int, seed: int = 0, rooms: list[RoomViews] = ROOMS, max_actions: int | None = None) -> BatchEnv:
@@ -56,6 +63,7 @@ def test_steps_against_a_plain_loop_over_episodes() -> None:
     actions_taken, moves, waiting = [0] * batch, [0] * batch, [False] * batch
     optimal = [int(room_of(view)[0].optimal[room_of(view)[1], seen.target[b]]) for b, view in enumerate(env.views)]
     ended = 0
+    felt: set[int] = set()
     for _ in range(300):
         before, target = env.views.copy(), env.observe().target
         actions = rng.choice(6, size=batch, p=[0.3, 0.2, 0.2, 0.1, 0.1, 0.1])
@@ -81,7 +89,9 @@ def test_steps_against_a_plain_loop_over_episodes() -> None:
             assert step.truncated[slot] == (over and not done)
             expected = views.graph.transitions[local, actions[slot]]
             assert room_of(int(env.views[slot])) == (views, expected)
-            assert env.observe().previous_action[slot] == actions[slot]
+            feels = FAILURES.get(int(actions[slot]), actions[slot]) if expected == local else actions[slot]
+            assert env.observe().previous_action[slot] == feels
+            felt.add(int(feels))
             assert not env.observe().first[slot]
             waiting[slot] = over
             if over:
@@ -99,6 +109,29 @@ def test_steps_against_a_plain_loop_over_episodes() -> None:
         assert step.finished == finished
         ended += len(finished)
     assert ended > 100
+    assert felt == {*Action, FAILED_MOVE, FAILED_LOOK}
+
+
+def test_what_is_in_the_way_and_where_the_camera_ends_is_felt() -> None:
+    """In a room of one position there is nowhere to go, and the camera has but two pitches."""
+    graph = open_grid(1, 1)
+    success = np.zeros((graph.views, len(TARGETS)), dtype=np.bool_)
+    success[:, 4] = np.arange(graph.views) != 0  # so that the episode begins at view 0, which looks straight ahead
+    env = make(1, rooms=[views_of(graph, success, RoomId("kitchen", 1))])
+    expected = [
+        (Action.LOOK_DOWN, Action.LOOK_DOWN),
+        (Action.LOOK_DOWN, FAILED_LOOK),
+        (Action.MOVE_AHEAD, FAILED_MOVE),
+        (Action.ROTATE_LEFT, Action.ROTATE_LEFT),
+        (Action.LOOK_UP, Action.LOOK_UP),
+        (Action.LOOK_UP, FAILED_LOOK),
+        (Action.DONE, Action.DONE),
+        (Action.MOVE_AHEAD, NO_ACTION),  # another episode begins
+    ]
+    env.observe()
+    for action, felt in expected:
+        env.step(all_of(action, 1))
+        assert env.observe().previous_action.tolist() == [felt]
 
 
 def test_the_last_observation_of_a_truncated_episode_is_seen() -> None:
