@@ -59,10 +59,12 @@ def test_a_run_from_before_there_was_a_choice_is_what_was_done_then() -> None:
         "merge_order",
         "graph_source",
         "imitation_weight",
+        "approach_weight",
+        "approach_frames",
         "relations",
     ):
         del values[later]
-    assert RunConfig.from_json(values) == RunConfig(preset="paper", seed=3)
+    assert RunConfig.from_json(values) == RunConfig(preset="paper", seed=3, approach_weight=0.0)
     del values["method"]
     with pytest.raises(HozError, match="missing or unknown: method"):
         RunConfig.from_json(values)
@@ -80,6 +82,14 @@ def test_relations_are_the_shipped_ones_unless_given_and_only_of_sp() -> None:
     assert replace(config, method="object", relations=()) == RunConfig(method="object")
 
 
+def test_the_approach_is_taught_less_with_every_frame_until_it_is_not() -> None:
+    config = RunConfig(approach_weight=0.4, approach_frames=1000, rollout_steps=10, batch=5)
+    weights = [config.approach_weight_at(version) for version in (0, 5, 10, 20, 21, 10**9)]
+    assert weights == pytest.approx([0.4, 0.3, 0.2, 0.0, 0.0, 0.0])
+    assert min(weights) == 0.0
+    assert replace(config, approach_weight=0.0).approach_weight_at(0) == 0.0
+
+
 def test_differences_are_named_with_both_values() -> None:
     assert RunConfig(seed=1).differences(RunConfig(seed=2)) == ["seed: 1, 2"]
     assert RunConfig().differences(RunConfig()) == []
@@ -94,4 +104,5 @@ def test_what_tells_runs_apart_does_not_change_when_fields_are_added() -> None:
     values = RunConfig(method="a3c").distinguishing()
     assert values["method"] == "a3c"
     assert "clustering" not in values
+    assert "approach_weight" not in RunConfig(approach_weight=0.0).distinguishing()
     assert RunConfig(clustering="random").distinguishing()["clustering"] == "random"

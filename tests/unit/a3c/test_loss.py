@@ -1,9 +1,12 @@
 import math
 from dataclasses import replace
 
+import pytest
 import torch
+from torch.nn import functional
 
 from hoz_dist.a3c.loss import LossWeights, a3c_loss
+from hoz_dist.a3c.rollout import Rollout
 from hoz_dist.policy.steering import Imitation
 from tests.unit.a3c.making import make_rollout
 
@@ -66,7 +69,9 @@ def test_imitation_moves_what_counts_to_the_experts_action_and_nothing_else() ->
     """Not where the step only reset, where no path leads to the target, or where the steering does not ask for it."""
     rollout = make_rollout(steps=2, batch=4, seed=5, ends=False)
     rollout.valid[0, 1] = False
-    expert = torch.tensor([[3, 3, -1, 3], [5, 0, 1, 2]])
+    labels = torch.tensor([[3, 3, 0, 3], [5, 0, 1, 2]])
+    expert = functional.one_hot(labels, 6).bool()
+    expert[0, 2] = False
     counts = torch.tensor([[True, True, True, False], [True, True, True, True]])
     imitated = torch.zeros(2, 4, 2, 6, requires_grad=True)  # two policies
     arguments = (replace(rollout, expert=expert), torch.zeros(2, 4, 6), torch.zeros(2, 4))
@@ -76,7 +81,7 @@ def test_imitation_moves_what_counts_to_the_experts_action_and_nothing_else() ->
     assert imitated.grad is not None
     assert imitated.grad[0, 1:].abs().max() == 0.0
     for t, b in ((0, 0), (1, 0), (1, 1), (1, 2), (1, 3)):
-        assert (imitated.grad[t, b].argmin(dim=-1) == expert[t, b]).all()
+        assert (imitated.grad[t, b].argmin(dim=-1) == labels[t, b]).all()
     torch.testing.assert_close(imitated.grad[0, 0, :, 3], torch.full((2,), 2.0 * (1 / 6 - 1) / 7))
 
 
@@ -85,3 +90,66 @@ def test_without_the_experts_actions_nothing_is_imitated() -> None:
     imitation = Imitation(torch.zeros(2, 4, 1, 6, requires_grad=True), torch.ones(2, 4, dtype=torch.bool))
     arguments = (rollout, torch.zeros(2, 4, 6), torch.zeros(2, 4), WEIGHTS._replace(imitation=1.0))
     assert a3c_loss(*arguments, imitation=imitation).imitation == 0.0
+
+
+def approaching() -> tuple[Rollout, torch.Tensor]:
+    """A rollout [2, 4] with what begins shortest paths, and where the target was seen.
+
+    Taught are steps (0, 0), where two actions begin a path, and (1, 0). Of the other episodes one was not begun yet
+    and then has not seen the target, one has no path, and one never sees the target.
+    """
+    rollout = make_rollout(steps=2, batch=4, seed=5, ends=False)
+    rollout.valid[0, 1] = False
+    expert = torch.zeros(2, 4, 6, dtype=torch.bool)
+    expert[..., 2] = True
+    expert[0, 0, 4] = True
+    expert[:, 2] = False
+    sighted = torch.tensor([[True, True, True, False], [True, False, True, False]])
+    return replace(rollout, expert=expert), sighted
+
+
+def gradient_of(rollout: Rollout, sighted: torch.Tensor | None, weight: float, logits: torch.Tensor) -> torch.Tensor:
+    """Gradient of the loss by the policy's logits, [T, B, 6]."""
+    logits = logits.clone().requires_grad_()
+    weights = WEIGHTS._replace(approach=weight)
+    a3c_loss(rollout, logits, torch.zeros(2, 4), weights, sighted=sighted).total.backward()  # type: ignore[no-untyped-call]
+    assert logits.grad is not None
+    return logits.grad
+
+
+def test_the_approach_is_taught_once_the_target_was_seen_and_nowhere_else() -> None:
+    """Where the step was taken and a path exists."""
+    rollout, sighted = approaching()
+    logits = torch.randn(2, 4, 6, generator=torch.Generator().manual_seed(0))
+    taught = gradient_of(rollout, sighted, 0.5, logits) - gradient_of(rollout, None, 0.5, logits)
+    assert (taught.abs().amax(dim=-1) > 1e-6).nonzero().tolist() == [[0, 0], [1, 0]]
+    assert (taught[0, 0] < 0).nonzero().flatten().tolist() == [2, 4], "any of the shortest ways will do"
+    assert (taught[1, 0] < 0).nonzero().flatten().tolist() == [2]
+
+
+def test_the_approach_is_the_surprise_at_doing_any_of_what_the_expert_might() -> None:
+    rollout, sighted = approaching()
+    arguments = (rollout, torch.zeros(2, 4, 6), torch.zeros(2, 4))
+    loss = a3c_loss(*arguments, WEIGHTS._replace(approach=0.5), sighted=sighted)
+    without = a3c_loss(*arguments, WEIGHTS)
+    assert loss.approach == pytest.approx((math.log(6 / 2) + math.log(6)) / 7, rel=1e-5)
+    assert loss.total.item() == pytest.approx(without.total.item() + 0.5 * loss.approach, rel=1e-5)
+
+
+def test_without_weight_labels_or_sight_the_loss_is_what_it_was() -> None:
+    rollout, sighted = approaching()
+    unlabelled = replace(rollout, expert=None)
+    logits = torch.randn(2, 4, 6, generator=torch.Generator().manual_seed(1))
+    plain = gradient_of(unlabelled, None, 0.0, logits)
+    assert torch.equal(gradient_of(rollout, sighted, 0.0, logits), plain)
+    assert torch.equal(gradient_of(unlabelled, sighted, 0.5, logits), plain)
+    assert torch.equal(gradient_of(rollout, torch.zeros_like(sighted), 0.5, logits), plain)
+
+
+def test_what_a_policy_never_does_is_taught_by_a_finite_gradient() -> None:
+    rollout, sighted = approaching()
+    logits = torch.zeros(2, 4, 6)
+    logits[..., 2] = logits[..., 4] = -1e4
+    gradient = gradient_of(rollout, sighted, 0.5, logits)
+    assert gradient.isfinite().all()
+    assert (gradient[0, 0, [2, 4]] < 0).all()

@@ -8,6 +8,8 @@ import pytest
 
 from hoz_dist.config import RunConfig
 from hoz_dist.gradient_forms import Vector
+from hoz_dist.nav.actions import NO_ACTION
+from hoz_dist.nav.feedback import FAILED_LOOK, FAILED_MOVE
 from hoz_dist.nav.observation import Observation
 from hoz_dist.policy.methods.description import Method
 from hoz_dist.policy.parameters import initial_parameters
@@ -28,8 +30,10 @@ LONG = 40
 """Actions after which an episode is cut off: longer than rollouts."""
 
 
-def push_of(trajectory: Trajectory, sequence: int, graphs: tuple[GraphUsed, ...] = USED) -> TrajectoryPush:
-    push = TrajectoryPush("a0", 7, sequence, 1, 0, trajectory.rooms, graphs, trajectory.steps)
+def push_of(
+    trajectory: Trajectory, sequence: int, graphs: tuple[GraphUsed, ...] = USED, version: int = 0
+) -> TrajectoryPush:
+    push = TrajectoryPush("a0", 7, sequence, 1, version, trajectory.rooms, graphs, trajectory.steps)
     return decode(encode(push), TrajectoryPush)
 
 
@@ -80,12 +84,17 @@ def test_what_the_actor_saw_is_seen_again(monkeypatch: pytest.MonkeyPatch) -> No
             np.testing.assert_array_equal(mine, theirs, err_msg=name)
         del actor._env.observe
     assert set(np.unique(again[-1].scene)) == {0, 2}
+    previous = np.stack([observation.previous_action for observation in again])
+    assert {NO_ACTION, FAILED_MOVE, FAILED_LOOK} < set(previous.ravel())
 
 
 @pytest.mark.parametrize("method", ["a3c", "hoz", "savn", "org-tpn"])
 def test_without_lag_the_gradients_are_the_actors_own(method: Method) -> None:
-    """Over several rollouts: what one ends with, the next begins with, though it never travels."""
-    config = dataclasses.replace(CONFIG, method=method)
+    """Over several rollouts: what one ends with, the next begins with, though it never travels.
+
+    And with an approach that is taught less from version to version, until it is not.
+    """
+    config = dataclasses.replace(CONFIG, method=method, approach_frames=4 * CONFIG.rollout_steps * CONFIG.batch)
     gradients, adam = learner_of(config)
     differentiating, recording = (make_collector(config, *ROOMS, max_actions=LONG) for _ in range(2))
     graphs = USED if method == "hoz" else ()
@@ -93,10 +102,12 @@ def test_without_lag_the_gradients_are_the_actors_own(method: Method) -> None:
         for collector in (differentiating, recording):
             collector.load(adam.parameters, sequence)
         update, trajectory = differentiating.roll_out(), recording.record()
-        learnt = gradients.learn(push_of(trajectory, sequence, graphs))
+        learnt = gradients.learn(push_of(trajectory, sequence, graphs, version=sequence))
         assert learnt.frames == update.frames == trajectory.frames
         assert learnt.loss is not None
         assert learnt.loss.terms() == pytest.approx(update.loss.terms(), abs=1e-4)
+        assert learnt.loss.approach == pytest.approx(update.loss.approach, abs=1e-4)
+        assert (update.loss.approach > 0.1) == (sequence < 4)
         assert_close(learnt.gradient, update.gradient)
         adam.step(update.gradient)  # the same for all, since Adam makes much of rounding
 
@@ -111,7 +122,7 @@ def test_the_learner_knows_the_experts_actions_and_the_steerings_memory(monkeypa
         for collector in (differentiating, recording):
             collector.load(adam.parameters, sequence)
         update, trajectory = differentiating.roll_out(), recording.record()
-        learnt = gradients.learn(push_of(trajectory, sequence, ()))
+        learnt = gradients.learn(push_of(trajectory, sequence, (), version=sequence))
         assert learnt.loss is not None
         assert learnt.loss.imitation == pytest.approx(update.loss.imitation, abs=1e-4)
         assert update.loss.imitation > 0.1
