@@ -41,8 +41,8 @@ def evaluated(run_folder: Path, cache: Path, capsys: pytest.CaptureFixture[str])
     return evaluate
 
 
-def test_the_same_seed_prints_the_same_and_another_one_something_else(
-    evaluated: Callable[[int], dict[str, Any]], run_folder: Path, cache: Path
+def test_the_same_seed_prints_the_same_and_another_one_or_temperature_something_else(
+    evaluated: Callable[[int], dict[str, Any]], run_folder: Path, cache: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     result = evaluated(0)
     assert (result["method"], result["split"], result["episodes"]) == ("hoz", "val", EPISODES)
@@ -55,6 +55,10 @@ def test_the_same_seed_prints_the_same_and_another_one_something_else(
 
     again = hoz_dist(*words_for(run_folder, cache, 0))
     assert again.stdout == json.dumps(result, indent=2) + "\n"
+    assert run([*words_for(run_folder, cache, 0), "--temperature", "0.01"]) == 0
+    likeliest = json.loads(capsys.readouterr().out)
+    assert likeliest["all"] != result["all"], "the likeliest actions do otherwise than drawn ones"
+    assert likeliest["baselines"] == result["baselines"]
     other = evaluated(7)
     assert other["all"] != result["all"]
     assert other["baselines"]["random"]["all"] != result["baselines"]["random"]["all"]
@@ -134,13 +138,14 @@ def test_a_missing_checkpoint_or_an_empty_folder_is_one_sentence(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_cache_that_cannot_be_written_or_an_unknown_scene_is_one_sentence(
+def test_a_cache_that_cannot_be_written_an_unknown_scene_or_no_temperature_is_one_sentence(
     run_folder: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "file").write_text("mine")
     for options, said in (
         (["--cache", str(tmp_path / "file" / "views")], f"The view cache {tmp_path}/file/views cannot be written"),
         (["--scene", "garage"], "Unknown scene 'garage'."),
+        (["--temperature", "0"], "Invalid value for '--temperature': 0.0 is not in the range"),
     ):
         assert run(["evaluate", str(run_folder), *options]) == 2
         out, err = capfd.readouterr()
