@@ -7,9 +7,10 @@ from hoz_dist.evaluation.loading import load_agent, matching_encoder
 from hoz_dist.policy.parameters import initial_parameters
 
 
-def test_parameters_of_another_network_are_refused() -> None:
-    with pytest.raises(DamagedFileError, match="do not fit"):
-        load_agent(RunConfig(), np.zeros(10, dtype=np.float32), {})
+@pytest.mark.parametrize("parameters", [10, 208_721], ids=["none", "of an agent that did not feel what failed"])
+def test_parameters_of_another_network_are_refused(parameters: int) -> None:
+    with pytest.raises(DamagedFileError, match=r"do not fit its configuration .*; use another checkpoint\."):
+        load_agent(RunConfig(), np.zeros(parameters, dtype=np.float32), {})
 
 
 def test_a_guided_method_needs_a_graph() -> None:
