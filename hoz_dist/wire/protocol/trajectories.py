@@ -105,7 +105,7 @@ class Steps(Structure):
         scene: [T + 1, B] u8, scene whose graph was used; 0 without the zone layer, as are the next two.
         current: [T + 1, B] u8, current zone.
         subgoal: [T + 1, B] u8, sub-goal zone.
-        previous_action: [B] u8, action before the first step; 6 for none.
+        previous_action: [B] u8, action before the first step, as it was `hoz_dist.nav.feedback.felt`; 6 for none.
         action: [T, B] u8.
         reward: [T, B] f32.
         log_probability: [T, B] f32, of the action under the policy that acted; at most 0.

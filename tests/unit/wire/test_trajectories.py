@@ -131,7 +131,7 @@ def with_reset_first(steps: Steps) -> np.ndarray:
         ("scene", 5, Reason.RANGE),
         ("current", 64, Reason.RANGE),
         ("subgoal", 64, Reason.RANGE),
-        ("previous_action", 7, Reason.RANGE),
+        ("previous_action", 9, Reason.RANGE),
         ("action", 6, Reason.RANGE),
         ("reward", 5.1, Reason.RANGE),
         ("reward", -0.02, Reason.RANGE),
