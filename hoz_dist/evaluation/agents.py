@@ -3,7 +3,9 @@
 from typing import Final, NamedTuple, Protocol
 
 import numpy as np
+import torch
 from numpy.typing import NDArray
+from torch import Tensor
 
 from hoz_dist.graph.planner import target_zone
 from hoz_dist.nav.actions import Action
@@ -106,25 +108,46 @@ class PolicyAgent:
 
     def begin(self, runner: EpisodeRunner, rng: np.random.Generator) -> None:
         """Prepare for the episodes of a runner."""
-        self._state, self._rng = self._policy.initial_state(len(runner.episodes)), rng
+        self._batch, self._rng = len(runner.episodes), rng
+        self._state = self._policy.initial_state(self._batch)
+        self._slots = np.arange(self._batch)
+        """The episodes that the state is of."""
         self._targets = np.array([episode.target for episode in runner.episodes])
         self._decision: Decision | None = None
 
     def act(self, runner: EpisodeRunner) -> NDArray[np.int64]:
         """Choose an action for each episode, [B]."""
-        decision = self._policy.act(runner.observe(), self._state, self._bank)
+        self._forget_ended(runner)
+        decision = self._policy.act(runner.observe(self._slots), self._state, self._bank)
         self._state, self._decision = decision.state, decision
-        return sample_actions(decision.logits, self._rng, self._temperature).numpy()
+        logits = torch.zeros(self._batch, decision.logits.shape[1])
+        logits[torch.from_numpy(self._slots)] = decision.logits
+        # An action is drawn for every episode, so that what one draws does not depend on which others have ended.
+        return sample_actions(logits, self._rng, self._temperature).numpy()
+
+    def _forget_ended(self, runner: EpisodeRunner) -> None:
+        """Drop ended episodes whenever they are half of what is computed: the last ones run much longer than most."""
+        running = runner.active[self._slots]
+        if 2 * running.sum() <= len(running):
+            self._state = self._state.select(torch.from_numpy(np.flatnonzero(running)))
+            self._slots = self._slots[running]
 
     def zone_plan(self) -> ZonePlan | None:
-        """Return what guided the last actions, [B]; None before the first ones and without the zone layer."""
+        """Return what guided the last actions, [B]; None before the first ones and without the zone layer.
+
+        Of episodes that have ended it says nothing of use.
+        """
         if self._decision is None or not self._policy.settings.zone_layer:
             return None
         guidance, nodes = self._decision.guidance, self._decision.state.zone.nodes
+        # As the navigator finds it, in the graph as updated so far this episode.
+        target = target_zone(nodes.numpy(), self._targets[self._slots])
         return ZonePlan(
-            scene=guidance.scene.numpy(),
-            current=guidance.current.numpy(),
-            # As the navigator finds it, in the graph as updated so far this episode.
-            target=target_zone(nodes.numpy(), self._targets),
-            subgoal=guidance.subgoal.numpy(),
+            *map(self._spread, (guidance.scene, guidance.current, torch.from_numpy(target), guidance.subgoal))
         )
+
+    def _spread(self, values: Tensor) -> NDArray[np.integer]:
+        """Return values of the episodes that are computed among all, [B]."""
+        spread = np.zeros(self._batch, np.int64)
+        spread[self._slots] = values.numpy()
+        return spread

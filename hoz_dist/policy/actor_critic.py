@@ -39,6 +39,15 @@ class State(NamedTuple):
     sighted: Tensor = torch.empty(0, dtype=torch.bool)
     """Whether the target has been seen in the episode, bool [B]; decides what is taught, and is no input."""
 
+    def select(self, episodes: Tensor) -> "State":
+        """Return the state of some of the episodes, by their indices."""
+        return State(
+            lstm=self.lstm[:, :, episodes],
+            zone=ZoneState(*(part[episodes] for part in self.zone)),
+            memory=tuple(part[episodes] for part in self.memory),
+            sighted=self.sighted[episodes],
+        )
+
 
 class Decision(NamedTuple):
     """What the network says at one step."""

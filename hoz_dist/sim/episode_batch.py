@@ -78,15 +78,15 @@ class EpisodeBatch:
         self._moves[slot] = 0
         self._previous[slot] = NO_ACTION
 
-    def observe(self) -> Observation:
-        """Show what each slot's agent sees now."""
-        sight = self._source.look(self.views)
+    def observe(self, slots: NDArray[np.int64] | None = None) -> Observation:
+        """Show what the agents of some slots see now, [slots, ...]; of all slots when None."""
+        chosen = np.arange(len(self.views)) if slots is None else slots
         return Observation(
-            *sight,
-            target=self._target.copy(),
-            previous_action=self._previous.copy(),
-            scene=self._scene.copy(),
-            first=self._actions == 0,
+            *self._source.look(self.views[chosen]),
+            target=self._target[chosen],
+            previous_action=self._previous[chosen],
+            scene=self._scene[chosen],
+            first=self._actions[chosen] == 0,
         )
 
     def act(self, actions: NDArray[np.int64], active: NDArray[np.bool_]) -> Outcome:

@@ -66,9 +66,9 @@ class EpisodeRunner:
         """View of each episode within its own room, [B]."""
         return self._batch.local_views()
 
-    def observe(self) -> Observation:
-        """Show what each episode's agent sees now; an ended one keeps its last view."""
-        return self._batch.observe()
+    def observe(self, slots: NDArray[np.int64] | None = None) -> Observation:
+        """Show what the agents of some episodes see now, of all when None; an ended one keeps its last view."""
+        return self._batch.observe(slots)
 
     def step(self, actions: NDArray[np.int64]) -> Outcome:
         """Take one action in each running episode.
