@@ -12,10 +12,10 @@ backpropagation, as for the LSTM), and what is kept after the last one is detach
 while it acts (SAVN's inner step) writes them out, or computes them under ``torch.enable_grad()``: `act` runs without.
 
 Imitation: a steering with ``imitates = True`` may return an `Imitation`: policies' logits, and at which steps they are
-to be taught the action of a shortest path. That action is a label; it never reaches the network. Who acts (an actor) or
-learns (a learner from rollouts) looks it up in the rooms it holds (`hoz_dist.sim.expert`) and puts it into
-`Rollout.expert`; `hoz_dist.a3c.loss` adds the cross-entropy with the weight ``RunConfig.imitation_weight``. Without a
-steering that imitates, nothing is looked up.
+to be taught the actions that begin a shortest path. These are labels; they never reach the network. Who acts (an actor)
+or learns (a learner from rollouts) looks them up in the rooms it holds (`hoz_dist.sim.expert`) and puts them into
+`Rollout.expert`; `hoz_dist.a3c.loss` adds the cross-entropy with the weight ``RunConfig.imitation_weight``. That comes
+besides the approach, which every policy is taught once the target was seen.
 
 The value function stays as it is: no steering changes it.
 """
@@ -45,7 +45,7 @@ class Moment(NamedTuple):
     target: Tensor
     """One-hot target indicator, [T, B, N]."""
     previous_action: Tensor
-    """int64 [T, B]; `hoz_dist.nav.actions.NO_ACTION` at the first step of an episode."""
+    """As it was `hoz_dist.nav.feedback.felt`, int64 [T, B]; ``NO_ACTION`` at the first step of an episode."""
     first: Tensor
     """Whether the step begins an episode, bool [T, B]."""
 

@@ -4,14 +4,15 @@ An agent that comes back to a view that it has had in the episode is in a deadlo
 wall. A memory of the last steps tells. Of what the agent did in states like the one it is in, TPN makes a tentative
 policy, which is a pseudo-label: the head takes a gradient step towards it, in evaluation as in training.
 
-Both the policy and TPN are taught the expert's action in deadlocks, and there alone (the paper's trial-driven imitation
-learning). Neither sees it: in evaluation there is none.
+Both the policy and TPN are taught the expert's actions in deadlocks (the paper's trial-driven imitation learning), TPN
+there alone, the policy also once the target was seen, as with every method. Neither sees them: in evaluation there are
+none.
 
 We had the paper's abstract and its authors' code, ECCV-VN, to go by. Deviations from the code:
 
 - What tells a deadlock is the picture, as an agent has nothing else; the code compares poses, which it is told by the
   simulator, in evaluation too.
-- A label is the expert's action where the agent is; the code's is that where the agent comes next.
+- Labels are the expert's actions where the agent is, any of which will do; the code's is one of where it comes next.
 - Only the head adapts; see `hoz_dist.policy.fast_weights` for why. It keeps what it learnt until the episode ends; the
   code forgets it after every 50 steps.
 - It adapts before it acts, so that the pseudo-label counts where it was made; in the code it counts from the next step.
