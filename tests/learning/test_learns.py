@@ -1,5 +1,7 @@
 """A tiny room is learnt within seconds, by every method, in one process."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
@@ -95,7 +97,16 @@ def test_what_imitates_learns_the_experts_actions(monkeypatch: pytest.MonkeyPatc
     steer_a3c(monkeypatch, ImitatingSteering)
     monkeypatch.setattr("hoz_dist.a3c.loss.ADVANTAGE_FLOOR", 1e9)
     config = RunConfig(method="a3c", batch=16, learning_rate=3e-3, entropy_weight=0.0, value_weight=0.0)
-    assert train(config, 40)[0] > 0.8
+    assert train(replace(config, approach_weight=0.0), UPDATES)[0] > 0.8
+
+
+def test_the_approach_is_learnt_from_its_labels_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By a policy that neither rewards nor entropy teach, and whose search therefore stays what it was."""
+    monkeypatch.setattr("hoz_dist.a3c.loss.ADVANTAGE_FLOOR", 1e9)
+    config = RunConfig(method="a3c", batch=16, learning_rate=3e-3, entropy_weight=0.0, value_weight=0.0)
+    taught, untaught = (train(replace(config, approach_weight=weight), 40)[0] for weight in (0.5, 0.0))
+    assert taught > 0.4
+    assert untaught < 0.2
 
 
 def test_one_seed_gives_identical_parameters_twice() -> None:
