@@ -40,8 +40,8 @@ class Budget:
 BUDGETS: Final = {
     budget.name: budget
     for budget in (
-        Budget(name="quick", room_frames=2_000_000, apartment_frames=4_000_000, seeds=1, key_seeds=2),
-        Budget(name="standard", room_frames=4_000_000, apartment_frames=8_000_000, seeds=3, key_seeds=5),
+        Budget(name="quick", room_frames=2_000_000, apartment_frames=3_000_000, seeds=1, key_seeds=2),
+        Budget(name="standard", room_frames=3_000_000, apartment_frames=5_000_000, seeds=3, key_seeds=5),
         Budget(name="full", room_frames=16_000_000, apartment_frames=24_000_000, seeds=5, key_seeds=5),
     )
 }
