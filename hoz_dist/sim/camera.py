@@ -11,6 +11,13 @@ from hoz_dist.sim.world import World
 
 NEAR_M: Final = 0.05
 FAR_M: Final = 20.0
+ASIDE_M: Final = (1e-4, 1.7e-4)
+"""How far the eye is beside its pose, (x, z) in metres: too little to show.
+
+Where a corner of a surface lies exactly in the camera's own plane, PyBullet's renderer gives depths that are not
+numbers, or never ends. Things are placed in whole millimetres and poses at multiples of 45 degrees, so this happens;
+with the step aside it does not.
+"""
 _LIGHT_DIRECTION: Final = (1.0, -2.0, 3.0)
 """Towards the light, (x, z, height); oblique, so that the faces of a box differ."""
 _AMBIENT: Final = 0.7
@@ -45,7 +52,7 @@ class Camera:
     def render(self, pose: Pose) -> Frame:
         """Draw what an agent at a pose sees."""
         yaw, pitch = np.deg2rad(pose.yaw), np.deg2rad(pose.pitch)
-        eye = (pose.x, pose.z, CAMERA_HEIGHT_M)
+        eye = (pose.x + ASIDE_M[0], pose.z + ASIDE_M[1], CAMERA_HEIGHT_M)
         ahead = (np.sin(yaw) * np.cos(pitch), np.cos(yaw) * np.cos(pitch), -np.sin(pitch))
         aim = [float(e + a) for e, a in zip(eye, ahead, strict=True)]
         view = pybullet.computeViewMatrix(eye, aim, (0.0, 0.0, 1.0))

@@ -2,9 +2,7 @@
 
 from collections.abc import Sequence
 from types import TracebackType
-from typing import TYPE_CHECKING, Final, Self
-
-import numpy as np
+from typing import TYPE_CHECKING, Self
 
 from hoz_dist.sim.pose_graph import PoseGraph, build_pose_graph
 from hoz_dist.sim.room import Room
@@ -12,13 +10,6 @@ from hoz_dist.sim.view_folder import Frames
 
 if TYPE_CHECKING:
     from hoz_dist.sim.camera import Camera
-
-ASIDE_M: Final = (1e-4, 1.7e-4)
-"""A step aside, (x, z) in metres, too small to show.
-
-PyBullet's renderer gives depths that are not numbers where an edge of a surface lies exactly in the camera's own plane,
-as for a camera that looks along a diagonal from the diagonal of a corner.
-"""
 
 
 class Painter:
@@ -65,11 +56,7 @@ class Painter:
         frames = Frames.empty(len(views), self._size)
         camera = self._eye()
         for row, view in enumerate(views):
-            pose = graph.pose(view)
-            frame = camera.render(pose)
-            if not np.isfinite(frame.depth).all():
-                frame = camera.render(pose._replace(x=pose.x + ASIDE_M[0], z=pose.z + ASIDE_M[1]))
-            frames.rgb[row], frames.depth[row], frames.segmentation[row] = frame
+            frames.rgb[row], frames.depth[row], frames.segmentation[row] = camera.render(graph.pose(view))
         return frames
 
     def _eye(self) -> "Camera":
