@@ -90,6 +90,13 @@ def test_pictures_look_where_the_pose_looks() -> None:
     assert columns[0] < 32 < columns[1], "what is at the right is drawn at the right"
 
 
+def test_a_corner_in_the_cameras_own_plane_does_not_stop_the_renderer() -> None:
+    """PyBullet never came back from this picture."""
+    with World(load_room(RoomId("bedroom", 26))) as world:
+        depth = Camera(world, 64).render(Pose(0.25, 3.0, 90, 0)).depth
+    assert np.isfinite(depth).all()
+
+
 def test_depth_is_in_metres_along_the_viewing_axis() -> None:
     wall = block("Wall", (4.0, 0.1, 3.0), (2.0, 3.55, 1.5))
     with World(bare_room(wall)) as world:
