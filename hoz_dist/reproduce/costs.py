@@ -12,8 +12,11 @@ START_S: Final = 10.0
 """Starting a learner and an actor, opening the rooms and saving the last checkpoint, seconds."""
 SHARE_IN_SERVICE: Final = 0.85
 """Frames per second of a learner and its actor over those of the same loop in one process (`docs/performance.md`)."""
-STEP_S: Final = 0.0004
-"""A step of an untrained agent's whole trial takes this long for each episode, seconds; it looks at nothing."""
+STEP_S: Final = 0.00002
+"""A step of an episode of an agent that is not trained takes this long, seconds; it looks at nothing."""
+SHARE_COMPUTED: Final = 0.1
+"""Steps that a trial computes over those of all its episodes up to the largest cap: most end long before, and those
+that have ended are soon dropped."""
 
 
 class Speed(NamedTuple):
@@ -73,10 +76,10 @@ class Costs:
         return before + (0.0 if chosen else self.of_choice(jobs[0])) + sum(map(self.of_test, jobs))
 
     def _trial(self, training: Training | None, scenes: Iterable[str], episodes: int) -> float:
-        """Return the seconds of one trial: all its episodes take steps until the last one reaches its cap."""
+        """Return the seconds of one trial."""
         step = STEP_S if training is None else self.speeds[training.digest].step_seconds
         caps = [evaluation_cap(scene) for scene in scenes]
-        return step * episodes * len(caps) * max(caps)
+        return SHARE_COMPUTED * step * episodes * len(caps) * max(caps)
 
     def to_json(self) -> dict[str, Any]:
         """Return JSON values."""

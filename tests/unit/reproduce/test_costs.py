@@ -2,7 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from hoz_dist.reproduce.costs import SHARE_IN_SERVICE, START_S, STEP_S, Costs, Speed, makespan
+from hoz_dist.reproduce.costs import SHARE_COMPUTED, SHARE_IN_SERVICE, START_S, STEP_S, Costs, Speed, makespan
 from hoz_dist.reproduce.job import jobs_of, tasks_of
 from tests.unit.reproduce.making import TABLE, TINY
 
@@ -19,7 +19,7 @@ def test_a_task_is_its_training_its_choice_and_its_tests(costs: Costs, tmp_path:
     (task,) = tasks_of(JOBS, tmp_path)
     train = START_S + 1000 / (100 * SHARE_IN_SERVICE)
     # Bathrooms end after 100 actions; every step costs 1 ms for each episode.
-    choose, test = 3 * 600 * 100 * 0.001, 2 * 8 * 100 * 0.001
+    choose, test = (number * 100 * SHARE_COMPUTED * 0.001 for number in (3 * 600, 2 * 8))
     assert costs.of_task(task, task.jobs) == pytest.approx(train + choose + 2 * test)
     assert costs.of_task(task, task.jobs[1:], done=1000) == pytest.approx(choose + test)
     assert costs.of_task(task, task.jobs[1:], done=1000, chosen=True) == pytest.approx(test)
@@ -28,7 +28,7 @@ def test_a_task_is_its_training_its_choice_and_its_tests(costs: Costs, tmp_path:
 
 def test_agents_that_are_not_trained_cost_their_test(costs: Costs, tmp_path: Path) -> None:
     (task,) = tasks_of(jobs_of(TABLE, TABLE.rows[0], TINY), tmp_path)
-    assert costs.of_task(task, task.jobs) == pytest.approx(2 * 8 * 100 * STEP_S)
+    assert costs.of_task(task, task.jobs) == pytest.approx(2 * 8 * 100 * SHARE_COMPUTED * STEP_S)
 
 
 @pytest.mark.parametrize(
