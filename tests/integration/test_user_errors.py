@@ -42,7 +42,7 @@ def contents(folder: Path) -> dict[str, bytes | None]:
         ("train --scene garage", "Unknown scene 'garage'."),
         ("train --scene kitchen/31", "Unknown room 'kitchen/31'"),
         ("train --scene kitchen/25", "Room kitchen/25 is kept for validation; train in kitchen/1 to kitchen/20."),
-        ("train --model dqn", "Unknown method 'dqn'. Known: a3c, object, hoz."),
+        ("train --model dqn", "Unknown method 'dqn'. Known: a3c, object, sp, savn, org, org-tpn, hoz, hoz-tpn."),
         ("train --preset huge", "Unknown preset 'huge'."),
         ("train --encoder vit", "Unknown encoder 'vit'."),
         ("train --minutes 1 --frames 1", "A run's budget is either minutes or frames; give one of them."),
