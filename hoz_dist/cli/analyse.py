@@ -62,8 +62,7 @@ def analyse_command(
     RUN is a run folder or a checkpoint file. Runs that differ by their seed alone count as one method. All of them, and
     Random and Oracle beside them, run the same fixed episodes. docs/analysis.md explains each figure.
     """
-    from rich.console import Console
-
+    from hoz_dist.cli.consoles import result_console
     from hoz_dist.cli.trace_runs import open_runs, trace_runs
     from hoz_dist.evaluation.analysis_table import analysis_table
 
@@ -91,7 +90,7 @@ def analyse_command(
         + (", those with L* >= 5" if only_long else ""),
         caption="docs/analysis.md explains each figure",
     )
-    Console().print(table)
+    result_console().print(table)
 
 
 def _results(traced: "TracedRuns", split: str) -> dict[str, Any]:

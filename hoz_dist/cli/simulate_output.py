@@ -5,9 +5,9 @@ from dataclasses import asdict
 from typing import Any, Final, NamedTuple
 
 import click
-from rich.console import Console
 from rich.table import Table
 
+from hoz_dist.cli.consoles import result_console
 from hoz_dist.errors import InvalidValueError
 from hoz_dist.scaling.costs import Costs
 from hoz_dist.scaling.designs import Design
@@ -15,7 +15,6 @@ from hoz_dist.scaling.setting import Prediction
 from hoz_dist.viz.scaling import scaling_figure
 from hoz_dist.viz.zones import png
 
-_FILE_WIDTH: Final = 160
 _LEGEND: Final = (
     "updates/s: versions of the parameters; lag: in versions; age: from an actor's parameters to the update; stale: "
     "gradients refused for their lag; busy: times that a push is told to come again; learner: load of the thread that "
@@ -93,8 +92,7 @@ def print_table(rows: Sequence[Row]) -> None:
             _figure(one.megabits_down),
             one.bottleneck,
         )
-    console = Console(highlight=False)
-    (console if console.is_terminal else Console(highlight=False, width=_FILE_WIDTH)).print(table)
+    result_console().print(table)
     click.echo(_LEGEND)
     if not all(row.prediction.gets_on for row in rows):
         click.echo("stands still: nothing that was pushed was answered for an hour of simulated time.")

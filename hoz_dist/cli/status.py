@@ -57,16 +57,17 @@ def status_command(
     if as_json:
         echo_json(status)
         return
-    from hoz_dist.cli.status_text import status_console, status_page
+    from hoz_dist.cli.consoles import result_console
+    from hoz_dist.cli.status_text import status_page
 
-    status_console().print(status_page(status))
+    result_console(markup=False).print(status_page(status))
 
 
 def _watch(open_client: "Callable[[], HozClient]", every: float, *, as_json: bool) -> None:
-    from hoz_dist.cli.status_text import status_console
+    from hoz_dist.cli.consoles import result_console
     from hoz_dist.cli.watching import Page, Watcher, print_json, print_line, watch
 
-    console = status_console()
+    console = result_console(markup=False)
     with ExitStack() as stack:
         watcher = stack.enter_context(Watcher(open_client))
         if as_json:

@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Iterator
 from typing import Any, Final
 
-from rich.console import Console, Group, RenderableType
+from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
@@ -14,15 +14,7 @@ _NAMED_ROOMS: Final = 3
 """Rooms of a process that are named one by one."""
 _NAMED_LEFT: Final = 3
 """Processes that left and are named in a line."""
-_FILE_WIDTH: Final = 200
-"""Columns when the output is no terminal: scripts that search it must find names in one piece."""
 _ORDER: Final = ("learner", "standby", "actor")
-
-
-def status_console() -> Console:
-    """Return where to show it: standard output."""
-    console = Console(highlight=False, markup=False)
-    return console if console.is_terminal else Console(highlight=False, markup=False, width=_FILE_WIDTH)
 
 
 def status_page(status: dict[str, Any]) -> RenderableType:
