@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from hoz_dist.cli.options import cache_option, weights_option
-from hoz_dist.nav.categories import SCENES
+from hoz_dist.cli.options import cache_option, trial_options, weights_option
 
 if TYPE_CHECKING:
     from hoz_dist.cli.trace_runs import TracedRuns
@@ -18,22 +17,7 @@ if TYPE_CHECKING:
 
 @click.command("analyse")
 @click.argument("runs", metavar="RUN...", nargs=-1, required=True, type=click.Path(path_type=Path))
-@click.option("--split", type=click.Choice(["val", "test"]), default="val", show_default=True, help="Rooms to use.")
-@click.option(
-    "--trials", type=click.IntRange(1, 100), default=1, show_default=True, help="Trials; each draws its own actions."
-)
-@click.option(
-    "--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of the first trial; the next adds 1."
-)
-@click.option(
-    "--episodes", type=click.IntRange(1, 100_000), default=400, show_default=True, help="Episodes in each scene."
-)
-@click.option(
-    "--scene",
-    "scenes",
-    multiple=True,
-    help=f"Scene to evaluate in: {', '.join(SCENES)}; may be repeated.  [default: those that it was trained in]",
-)
+@trial_options(trials=1)
 @click.option("--long", "only_long", is_flag=True, help="Show the episodes with L* >= 5 alone in the table.")
 @click.option(
     "--curve", is_flag=True, help="Also measure each checkpoint that a run folder keeps, for frames to SR 50 and 70."

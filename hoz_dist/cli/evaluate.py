@@ -5,28 +5,12 @@ from pathlib import Path
 
 import click
 
-from hoz_dist.cli.options import cache_option, weights_option
-from hoz_dist.nav.categories import SCENES
+from hoz_dist.cli.options import cache_option, trial_options, weights_option
 
 
 @click.command("evaluate")
 @click.argument("checkpoint", type=click.Path(path_type=Path))
-@click.option("--split", type=click.Choice(["val", "test"]), default="val", show_default=True, help="Rooms to use.")
-@click.option(
-    "--trials", type=click.IntRange(1, 100), default=5, show_default=True, help="Trials; each draws its own actions."
-)
-@click.option(
-    "--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of the first trial; the next adds 1."
-)
-@click.option(
-    "--episodes", type=click.IntRange(1, 100_000), default=400, show_default=True, help="Episodes in each scene."
-)
-@click.option(
-    "--scene",
-    "scenes",
-    multiple=True,
-    help=f"Scene to evaluate in: {', '.join(SCENES)}; may be repeated.  [default: those that it was trained in]",
-)
+@trial_options(trials=5)
 @click.option(
     "--temperature",
     type=click.FloatRange(0.01, 10.0),

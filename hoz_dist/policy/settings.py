@@ -1,6 +1,6 @@
 """What shapes a policy network: method, preset and layers."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, Literal
 
 from hoz_dist.nav.categories import ROOM_SCENES
@@ -45,37 +45,24 @@ class Sizes:
     lstm_layers: int
 
 
+_COMPACT: Final = Sizes(
+    trunk="vector",
+    picture=64,
+    target=16,
+    action=8,
+    objects=16,
+    prior_nodes=32,
+    prior=32,
+    relation_hidden=16,
+    relation=4,
+    tentative=32,
+    zones=32,
+    lstm=128,
+    lstm_layers=1,
+)
 PRESETS: Final[dict[Preset, Sizes]] = {
-    "compact": Sizes(
-        trunk="vector",
-        picture=64,
-        target=16,
-        action=8,
-        objects=16,
-        prior_nodes=32,
-        prior=32,
-        relation_hidden=16,
-        relation=4,
-        tentative=32,
-        zones=32,
-        lstm=128,
-        lstm_layers=1,
-    ),
-    "medium": Sizes(
-        trunk="vector",
-        picture=64,
-        target=16,
-        action=8,
-        objects=16,
-        prior_nodes=32,
-        prior=32,
-        relation_hidden=16,
-        relation=4,
-        tentative=32,
-        zones=32,
-        lstm=256,
-        lstm_layers=1,
-    ),
+    "compact": _COMPACT,
+    "medium": replace(_COMPACT, lstm=256),
     "paper": Sizes(
         trunk="grid",
         picture=64,
