@@ -19,7 +19,7 @@ from hoz_dist.evaluation.trace import EpisodeTrace, trace_episodes
 from hoz_dist.nav.metrics import metrics_of
 from hoz_dist.nav.rooms import Split
 from hoz_dist.viz.trajectory import Trajectory, trajectories_of
-from learner.checkpoint import FOLDER, KEPT_SUFFIX, Checkpoint, Stamp, checkpoint_files, load_checkpoint, reading
+from learner.checkpoint import Checkpoint, kept_checkpoints, load_checkpoint
 
 _MOST_COLUMNS: Final = 4
 """Agents whose ways are drawn side by side."""
@@ -101,7 +101,7 @@ def open_runs(
         HozError: A run cannot be read, keeps no checkpoint, or the runs cannot have the same episodes.
     """
     checkpoints = [load_checkpoint(path) for path in paths]
-    kept = [kept_checkpoints(path) if with_kept else () for path in paths]
+    kept = [_kept(path) if with_kept else () for path in paths]
     names = method_names(paths, [checkpoint.config for checkpoint in checkpoints])
     benchmarks = [
         open_benchmark(checkpoint, split=split, episodes=episodes, scenes=scenes, weights=weights, cache=cache)
@@ -141,23 +141,18 @@ def method_names(paths: Sequence[Path], configs: Sequence[RunConfig]) -> list[st
     return [f"{names[one]} ({paths[one]})" if names[one] in ambiguous else names[one] for one in first]
 
 
-def kept_checkpoints(path: Path) -> tuple[Path, ...]:
-    """Return the checkpoints that a run folder keeps for ever, one of each version, in the order of the training.
+def _kept(path: Path) -> tuple[Path, ...]:
+    """Return the checkpoints of a run's curve.
 
     Raises:
         NotFoundError: There is none.
         UnreadableError: The folder cannot be read now.
     """
-    kept: dict[int, Path] = {}
-    with reading(path):
-        for file in checkpoint_files(path / FOLDER):  # the newest first
-            stamp = Stamp.of(file)
-            if stamp is not None and file.with_suffix(KEPT_SUFFIX).exists():
-                kept.setdefault(stamp.version, file)
+    kept = kept_checkpoints(path)
     if not kept:
         message = f"'{path}' keeps no checkpoint for a curve; give a run folder that was trained with --keep-every."
         raise NotFoundError(message)
-    return tuple(file for _, file in sorted(kept.items()))
+    return kept
 
 
 def trace_runs(runs: Sequence[Run], seeds: Sequence[int]) -> TracedRuns:

@@ -1,0 +1,43 @@
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from hoz_dist.cli import reproduce_task
+from hoz_dist.cli.reproduce_task import Place, Report
+from hoz_dist.evaluation import loading
+from hoz_dist.nav.episode import EpisodeResult
+from hoz_dist.nav.rooms import RoomId
+from hoz_dist.reproduce.job import jobs_of
+from learner.checkpoint import FOLDER, save_checkpoint
+from learner.core import LearnerCore
+from tests.unit.learner.making import CONFIG, vector
+from tests.unit.reproduce.making import TABLE, TINY
+
+
+@pytest.fixture
+def benchmark(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every agent fails in the same way."""
+    failure = EpisodeResult(RoomId("bathroom", 21), 0, success=False, actions=9, moves=3, said_done=True, optimal=4)
+    trials = SimpleNamespace(trials=[[failure]])
+    monkeypatch.setattr(loading, "load_agent", lambda *_: None)
+    monkeypatch.setattr(reproduce_task, "_benchmark", lambda *_: SimpleNamespace(run=lambda *_: trials))
+
+
+@pytest.mark.usefixtures("benchmark")
+def test_candidates_are_the_last_that_differ_and_the_end_among_them(tmp_path: Path) -> None:
+    job = jobs_of(TABLE, TABLE.rows[1], TINY)[0]
+    assert job.training is not None
+    folder = job.training.folder(tmp_path) / FOLDER
+    made = LearnerCore(CONFIG, vector(0), epoch=1).snapshot(now=5.0)
+    # Two learners were killed after they had kept version 30, and one after it had written the end but not its mark.
+    for epoch, version, keep in ((1, 10, True), (1, 20, True), (2, 30, True), (3, 30, True), (3, 40, False)):
+        one = replace(made, epoch=epoch, version=version, frames=100 * version)
+        save_checkpoint(folder, one, keep=keep)
+
+    reports: list[Report] = []
+    chosen, choice = reproduce_task._choose(job, job.training, Place(tmp_path, tmp_path), reports.append)
+    assert [one["frames"] for one in choice["candidates"]] == [2000, 3000, 4000]
+    assert chosen.version == 40
+    assert [report.share for report in reports] == pytest.approx([0, 1 / 3, 2 / 3])
