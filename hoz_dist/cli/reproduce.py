@@ -65,7 +65,8 @@ def reproduce_command(
     and at most half a minute of the rest; the same command goes on.
     """
     from hoz_dist.reproduce.budget import BUDGETS
-    from hoz_dist.reproduce.job import jobs_of
+    from hoz_dist.reproduce.job import jobs_of, seeds_of
+    from hoz_dist.reproduce.row import BASELINES
     from hoz_dist.reproduce.tables import TABLES
 
     if budget not in BUDGETS:
@@ -82,6 +83,8 @@ def reproduce_command(
     if rows and collect:
         message = "--row chooses what is trained and --collect trains nothing; leave out one of them."
         raise InvalidValueError(message)
+    if all(seeds == len(seeds_of(row, spend)) for row in wanted.rows if row.agent not in BASELINES):
+        seeds = None
     of_rows = {row.name: jobs_of(wanted, row, spend, None if seeds is None else range(seeds)) for row in wanted.rows}
     command = f"hoz-dist reproduce {table} --budget {budget}" + (f" --seeds {seeds}" if seeds else "")
     chosen = [job for name, jobs_of_row in of_rows.items() if not rows or name in rows for job in jobs_of_row]
@@ -91,7 +94,7 @@ def reproduce_command(
             finished = work_off(table, chosen, out, cache, processes, only_estimate=estimate, as_json=as_json)
         if not finished:
             return
-    _show(wanted, spend, command, of_rows, out, docs, as_json=as_json)
+    _show(wanted, spend, command, of_rows, out, docs, seeds=seeds, as_json=as_json)
 
 
 def work_off(
@@ -174,12 +177,13 @@ def _show(
     out: Path,
     docs: Path | None,
     *,
+    seeds: int | None,
     as_json: bool,
 ) -> None:
     """Write the table's files, and print it."""
     from hoz_dist.cli.reproduce_results import Results, read_sessions
 
-    results = Results.read(table, budget, command, jobs, out)
+    results = Results.read(table, budget, command, jobs, out, seeds=seeds)
     sessions = [one for one in read_sessions(out / SESSIONS_FILE) if one["table"] == table.name]
     paths = results.write(out, sessions)
     if docs is not None:

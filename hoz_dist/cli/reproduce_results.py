@@ -22,6 +22,10 @@ class Results:
     table: Table
     budget: Budget
     command: str
+    seeds: int | None
+    """Training runs of each row; None when they are as the budget says."""
+    jobs: Mapping[str, Sequence[Job]]
+    """Of each row, finished or not."""
     outcomes: Mapping[str, Mapping[int, Outcome]]
     """By row and seed."""
     summaries: Mapping[str, RowSummary]
@@ -29,7 +33,14 @@ class Results:
 
     @classmethod
     def read(
-        cls, table: Table, budget: Budget, command: str, jobs: Mapping[str, Sequence[Job]], out: Path
+        cls,
+        table: Table,
+        budget: Budget,
+        command: str,
+        jobs: Mapping[str, Sequence[Job]],
+        out: Path,
+        *,
+        seeds: int | None = None,
     ) -> "Results":
         """Read what is finished.
 
@@ -39,6 +50,7 @@ class Results:
             command: The command that makes the table.
             jobs: Of each row.
             out: Folder of everything.
+            seeds: Training runs of each row; None when they are as the budget says.
 
         Raises:
             DamagedFileError: A file holds no outcome.
@@ -47,7 +59,18 @@ class Results:
             name: {job.seed: Outcome.load(job.result(out)) for job in of_row if job.result(out).exists()}
             for name, of_row in jobs.items()
         }
-        return cls(table, budget, command, outcomes, summarise(outcomes, table.references))
+        return cls(table, budget, command, seeds, jobs, outcomes, summarise(outcomes, table.references))
+
+    @property
+    def unfinished(self) -> dict[str, tuple[int, int]]:
+        """Number of results and of those wanted, by row that lacks some."""
+        numbers = {name: (len(self.outcomes[name]), len(of_row)) for name, of_row in self.jobs.items()}
+        return {name: (finished, wanted) for name, (finished, wanted) in numbers.items() if finished < wanted}
+
+    @property
+    def stem(self) -> str:
+        """What the table's files are called, less their suffixes; a table of fewer seeds is another one."""
+        return f"{self.table.name}-{self.budget.name}" + ("" if self.seeds is None else f"-seeds-{self.seeds}")
 
     @property
     def hours(self) -> float:
@@ -65,7 +88,7 @@ class Results:
 
     def text(self) -> str:
         """Return the table as Markdown."""
-        text = table_text(self.table, self.budget, self.summaries, self.command)
+        text = table_text(self.table, self.budget, self.summaries, self.command, self.unfinished)
         return f"{text}\n{self.hours:.1f} hours of runs in all.\n" if self.summaries else text
 
     def to_json(self) -> dict[str, Any]:
@@ -77,6 +100,9 @@ class Results:
             "note": self.table.note,
             "command": self.command,
             "budget": asdict(self.budget),
+            "unfinished": {
+                name: {"finished": finished, "wanted": wanted} for name, (finished, wanted) in self.unfinished.items()
+            },
             "hours": round(self.hours, 2),
             "rows": {
                 name: {
@@ -101,8 +127,7 @@ class Results:
             sessions: How long each start of the command was expected to take, and took.
         """
         folder.mkdir(parents=True, exist_ok=True)
-        stem = folder / f"{self.table.name}-{self.budget.name}"
-        paths = [stem.with_suffix(".md"), stem.with_suffix(".json")]
+        paths = [folder / f"{self.stem}.md", folder / f"{self.stem}.json"]
         write_atomically(paths[0], self.text().encode(), overwrite=True)
         text = json.dumps(self.to_json() | {"sessions": list(sessions)}, indent=2) + "\n"
         write_atomically(paths[1], text.encode(), overwrite=True)
@@ -110,7 +135,7 @@ class Results:
             from hoz_dist.reproduce.plot import table_figure
             from hoz_dist.viz.zones import png
 
-            paths.append(stem.with_suffix(".png"))
+            paths.append(folder / f"{self.stem}.png")
             write_atomically(paths[2], png(table_figure(self.table, self.summaries)), overwrite=True)
         return paths
 

@@ -167,7 +167,7 @@ def jobs_of(table: Table, row: Row, budget: Budget, seeds: Sequence[int] | None 
     )
     if row.agent in BASELINES:
         return (Job(row.agent, None, protocol),)
-    wanted = range(budget.key_seeds if row.key else budget.seeds) if seeds is None else seeds
+    wanted = seeds_of(row, budget) if seeds is None else seeds
     frames = budget.frames(table.scenes)
     recipe = RunConfig(preset="medium", frames=frames, approach_frames=frames, scenes=scenes_to_tell(scenes))
     config = RunConfig.from_json(recipe.to_json() | {"method": row.agent, **_as_json(row.options)})
@@ -176,6 +176,11 @@ def jobs_of(table: Table, row: Row, budget: Budget, seeds: Sequence[int] | None 
         Job(row.agent, Training(replace(config, seed=seed), table.scenes, budget.checkpoints), protocol, tested_with)
         for seed in wanted
     )
+
+
+def seeds_of(row: Row, budget: Budget) -> range:
+    """Return the seeds that a budget has a row trained with."""
+    return range(budget.key_seeds if row.key else budget.seeds)
 
 
 def tasks_of(jobs: Iterable[Job], out: Path) -> tuple[Task, ...]:
