@@ -65,8 +65,6 @@ def reproduce_command(
     and at most half a minute of the rest; the same command goes on.
     """
     from hoz_dist.reproduce.budget import BUDGETS
-    from hoz_dist.reproduce.job import jobs_of, seeds_of
-    from hoz_dist.reproduce.row import BASELINES
     from hoz_dist.reproduce.tables import TABLES
 
     if budget not in BUDGETS:
@@ -76,6 +74,9 @@ def reproduce_command(
         return
     if table not in TABLES:
         raise UnknownNameError.of("table", table, TABLES)
+    from hoz_dist.reproduce.job import jobs_of, seeds_of
+    from hoz_dist.reproduce.row import BASELINES
+
     wanted, spend = TABLES[table], BUDGETS[budget]
     for name in rows:
         if name not in {row.name for row in wanted.rows}:

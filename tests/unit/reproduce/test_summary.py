@@ -4,6 +4,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from hoz_dist.errors import HozError
 from hoz_dist.reproduce.markdown import aligned, table_text
 from hoz_dist.reproduce.outcome import Outcome
 from hoz_dist.reproduce.plot import table_figure
@@ -49,8 +50,8 @@ def test_scenes_are_told_apart(outcomes: dict[str, dict[int, Outcome]]) -> None:
 
 def test_outcomes_of_other_episodes_are_not_compared(outcomes: dict[str, dict[int, Outcome]]) -> None:
     one = outcomes["hoz"][0]
-    outcomes["hoz"][0] = replace(one, optimal=one.optimal + 1)
-    with pytest.raises(ValueError, match="different episodes"):
+    outcomes["hoz"][1] = replace(one, optimal=one.optimal + 1)
+    with pytest.raises(HozError, match="'hoz' with seed 1 are of different episodes"):
         summarise(outcomes, ["hoz"])
 
 
