@@ -92,14 +92,15 @@ def reproduce_command(
     if not collect:
         with _alone(out):
             processes = jobs or len(os.sched_getaffinity(0))
-            finished = work_off(table, chosen, out, cache, processes, only_estimate=estimate, as_json=as_json)
+            finished = work_off(wanted, spend, chosen, out, cache, processes, only_estimate=estimate, as_json=as_json)
         if not finished:
             return
     _show(wanted, spend, command, of_rows, out, docs, seeds=seeds, as_json=as_json)
 
 
 def work_off(
-    table: str,
+    table: "Table",
+    budget: "Budget",
     jobs: "Sequence[Job]",
     out: Path,
     cache: Path | None,
@@ -111,7 +112,8 @@ def work_off(
     """Say how long jobs take, then do them.
 
     Args:
-        table: Name of the table that they are for.
+        table: The table that they are for.
+        budget: What every row gets.
         jobs: What is to do; finished ones are passed over.
         out: Folder of runs and results.
         cache: The view cache; the default one when None.
@@ -150,7 +152,8 @@ def work_off(
     if only_estimate:
         return False
     session: dict[str, Any] = {
-        "table": table,
+        "table": table.name,
+        "budget": budget.name,
         "runs": len(tasks),
         "jobs": processes,
         "measuring_seconds": round(time.monotonic() - began, 1),
@@ -185,7 +188,11 @@ def _show(
     from hoz_dist.cli.reproduce_results import Results, read_sessions
 
     results = Results.read(table, budget, command, jobs, out, seeds=seeds)
-    sessions = [one for one in read_sessions(out / SESSIONS_FILE) if one["table"] == table.name]
+    sessions = [
+        one
+        for one in read_sessions(out / SESSIONS_FILE)
+        if (one["table"], one.get("budget")) == (table.name, budget.name)
+    ]
     paths = results.write(out, sessions)
     if docs is not None:
         paths = results.write(docs, sessions)

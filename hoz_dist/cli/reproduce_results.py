@@ -89,10 +89,13 @@ class Results:
     def text(self) -> str:
         """Return the table as Markdown."""
         text = table_text(self.table, self.budget, self.summaries, self.command, self.unfinished)
-        return f"{text}\n{self.hours:.1f} hours of runs in all.\n" if self.summaries else text
+        if not self.summaries:
+            return text
+        folders = ", ".join(f"{name} `{self.jobs[name][0].result(Path()).parent}`" for name in self.summaries)
+        return f"{text}\n{self.hours:.1f} hours of runs in all. Every episode of each row, under `--out`: {folders}.\n"
 
     def to_json(self) -> dict[str, Any]:
-        """Return everything but the results of single episodes."""
+        """Return everything but the results of episodes, for which each run names its file in the folder."""
         papers = {row.name: row.paper for row in self.table.rows if row.paper is not None}
         return {
             "table": self.table.name,
@@ -113,7 +116,11 @@ class Results:
                     }
                     if name in papers
                     else None,
-                    "runs": {seed: dict(outcome.facts) for seed, outcome in self.outcomes[name].items()},
+                    "runs": {
+                        job.seed: {"file": str(job.result(Path())), **self.outcomes[name][job.seed].facts}
+                        for job in self.jobs[name]
+                        if job.seed in self.outcomes[name]
+                    },
                 }
                 for name, summary in self.summaries.items()
             },

@@ -153,6 +153,7 @@ def _test(job: Job, place: Place, tell: Tell) -> None:
     from hoz_dist.evaluation.agents import OracleAgent, RandomAgent
     from hoz_dist.evaluation.loading import load_agent
     from hoz_dist.reproduce.outcome import Outcome
+    from learner.checkpoint import load_checkpoint
 
     facts: dict[str, Any] = {"agent": job.agent, "version": __version__, "cores": len(os.sched_getaffinity(0))}
     protocol, config = job.protocol, job.test_config
@@ -165,7 +166,8 @@ def _test(job: Job, place: Place, tell: Tell) -> None:
             "rooms_trained_in": list(job.training.scenes),
             "tested_with": dict(job.tested_with),
             "frames": checkpoint.frames,
-            "training_seconds": round(checkpoint.seconds, 1),
+            "training_seconds": round(load_checkpoint(job.training.folder(place.out)).seconds, 1),
+            "seconds_to_chosen": round(checkpoint.seconds, 1),
             "choice": choice,
         }
     benchmark = _benchmark(place, config.picture_size, protocol.rooms("test"), "test", protocol.test_episodes)
