@@ -119,7 +119,7 @@ def _train(training: Training, place: Place, tell: Tell) -> None:
 
 def _choose(job: Job, training: Training, place: Place, tell: Tell) -> "tuple[Checkpoint, dict[str, Any]]":
     """Return the checkpoint that is best on validation rooms by SR, then SPL, then frames; and how it was chosen."""
-    from hoz_dist.evaluation.loading import load_agent
+    from hoz_dist.cli.measure import agent_of
     from hoz_dist.nav.metrics import metrics_of
     from learner.checkpoint import FOLDER, kept_checkpoints, load_checkpoint
 
@@ -136,8 +136,7 @@ def _choose(job: Job, training: Training, place: Place, tell: Tell) -> "tuple[Ch
     for number, path in enumerate(kept):
         tell(Report("choosing", number / len(kept)))
         checkpoint = load_checkpoint(path)
-        agent = load_agent(checkpoint.config, checkpoint.parameters, checkpoint.scene_graphs())
-        metrics = metrics_of(benchmark.run(agent, [0]).trials[0])
+        metrics = metrics_of(benchmark.run(agent_of(checkpoint), [0]).trials[0])
         candidates.append(
             {"checkpoint": path.name, "frames": checkpoint.frames}
             | {name: round(100 * getattr(metrics, name), 2) for name in ("sr", "spl", "sae")}
@@ -150,8 +149,8 @@ def _choose(job: Job, training: Training, place: Place, tell: Tell) -> "tuple[Ch
 
 def _test(job: Job, place: Place, tell: Tell) -> None:
     """Test an agent on the test rooms, once for all, and keep what came of every episode."""
+    from hoz_dist.cli.measure import agent_of
     from hoz_dist.evaluation.agents import OracleAgent, RandomAgent
-    from hoz_dist.evaluation.loading import load_agent
     from hoz_dist.reproduce.outcome import Outcome
     from learner.checkpoint import load_checkpoint
 
@@ -173,7 +172,7 @@ def _test(job: Job, place: Place, tell: Tell) -> None:
     benchmark = _benchmark(place, config.picture_size, protocol.rooms("test"), "test", protocol.test_episodes)
     agent: Agent
     if chosen is not None:
-        agent = load_agent(config, chosen.parameters, chosen.scene_graphs())
+        agent = agent_of(chosen)
     else:
         agent = RandomAgent() if job.agent == "random" else OracleAgent(list(benchmark.rooms))
     began = time.monotonic()

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final, NamedTuple
 
-from hoz_dist.cli.measure import open_benchmark
+from hoz_dist.cli.measure import agent_of, open_benchmark
 from hoz_dist.cli.progress import Progress
 from hoz_dist.config import RunConfig
 from hoz_dist.errors import InvalidValueError, NotFoundError
@@ -14,7 +14,6 @@ from hoz_dist.evaluation.analysis import Analysis
 from hoz_dist.evaluation.benchmark import Benchmark
 from hoz_dist.evaluation.episode_analysis import EpisodeAnalysis, analyse_episodes
 from hoz_dist.evaluation.learning_curve import LearningCurve
-from hoz_dist.evaluation.loading import load_agent
 from hoz_dist.evaluation.trace import EpisodeTrace, trace_episodes
 from hoz_dist.nav.metrics import metrics_of
 from hoz_dist.nav.rooms import Split
@@ -181,7 +180,7 @@ def trace_runs(runs: Sequence[Run], seeds: Sequence[int]) -> TracedRuns:
         analyse(RandomAgent(), RandomAgent.name, benchmark, seeds[0])
         for run in runs:
             for seed in seeds:
-                traces = analyse(_agent(run.checkpoint), run.method, run.benchmark, seed)
+                traces = analyse(agent_of(run.checkpoint), run.method, run.benchmark, seed)
                 shown.setdefault(run.method, traces)
             if run.kept:
                 curves.setdefault(run.method, []).append(_curve(run, episodes))
@@ -217,16 +216,12 @@ class _Episodes(Progress):
         return traces
 
 
-def _agent(checkpoint: Checkpoint) -> Agent:
-    return load_agent(checkpoint.config, checkpoint.parameters, checkpoint.scene_graphs())
-
-
 def _curve(run: Run, episodes: _Episodes) -> LearningCurve:
     """Measure the kept checkpoints of a run."""
     frames, success = [], []
     for file in run.kept:
         checkpoint = load_checkpoint(file)
-        traces = episodes.trace(_agent(checkpoint), f"{run.method}, version {checkpoint.version}", run.benchmark, 0)
+        traces = episodes.trace(agent_of(checkpoint), f"{run.method}, version {checkpoint.version}", run.benchmark, 0)
         frames.append(checkpoint.frames)
         success.append(100.0 * metrics_of(trace.result for trace in traces).sr)
     return LearningCurve(tuple(frames), tuple(success))

@@ -5,9 +5,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from hoz_dist.cli import reproduce_task
+from hoz_dist.cli import measure, reproduce_task
 from hoz_dist.cli.reproduce_task import Place, Report
-from hoz_dist.evaluation import loading
 from hoz_dist.evaluation.trials import Evaluation
 from hoz_dist.nav.episode import EpisodeResult
 from hoz_dist.nav.rooms import RoomId
@@ -24,7 +23,7 @@ def benchmark(monkeypatch: pytest.MonkeyPatch) -> None:
     """Every agent fails in the same way."""
     failure = EpisodeResult(RoomId("bathroom", 21), 0, success=False, actions=9, moves=3, said_done=True, optimal=4)
     trials = Evaluation("object", "val", ((failure,),))
-    monkeypatch.setattr(loading, "load_agent", lambda *_: None)
+    monkeypatch.setattr(measure, "load_agent", lambda *_: None)
     monkeypatch.setattr(reproduce_task, "_benchmark", lambda *_: SimpleNamespace(run=lambda *_, **__: trials))
 
 
