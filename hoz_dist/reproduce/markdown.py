@@ -106,7 +106,7 @@ def _kind(compared: Sequence[Row], reference: str, summaries: Mapping[str, RowSu
     single = [name for name in trained if min(own, len(summaries[name].seeds)) == 1]
     text = (
         f"Percent points with {CONFIDENCE:.0%} intervals: {REPLICATES} bootstrap replicates over seeds (paired where "
-        "both rows have the same) and episodes (always paired)."
+        "both rows have the same; stretched by Student's t, as they are few) and episodes (always paired)."
     )
     if single:
         text += f" Of one seed on either side, so hardly anything about another training: {', '.join(single)}."
