@@ -243,6 +243,28 @@ def checkpoint_files(folder: Path) -> list[Path]:
     return [file for _, file in _stamped(folder)]
 
 
+def kept_checkpoints(run: Path, *, with_newest: bool = False) -> tuple[Path, ...]:
+    """Return the checkpoints that a run folder keeps for ever, in the order of the training.
+
+    Each version is there once, though each learner that opens a finished run keeps its end anew; and what a later epoch
+    did not go on from is left out.
+
+    Args:
+        run: The run folder.
+        with_newest: Also the newest, which is not marked when everything was killed right after it was written.
+
+    Raises:
+        UnreadableError: The folder cannot be read now.
+    """
+    kept: list[tuple[Stamp, Path]] = []
+    with reading(run):
+        for stamp, file in _stamped(run / FOLDER):  # the newest first
+            wanted = file.with_suffix(KEPT_SUFFIX).exists() or (with_newest and not kept)
+            if wanted and (not kept or stamp.version < kept[-1][0].version):
+                kept.append((stamp, file))
+    return tuple(file for _, file in reversed(kept))
+
+
 def _stamped(folder: Path) -> list[tuple[Stamp, Path]]:
     """Return the checkpoints of a folder and where in the run they belong, the newest first."""
     try:

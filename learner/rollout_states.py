@@ -32,14 +32,14 @@ class Ended(NamedTuple):
         return cls(
             push.incarnation,
             push.sequence,
-            State(state.lstm.clone(), zone, memory, state.sighted.clone()),
+            State(state.lstm.clone(), zone, memory, state.target_seen.clone()),
             known.clone(),
         )
 
     @property
     def size(self) -> int:
         """Bytes that it takes."""
-        tensors = (self.state.lstm, *self.state.zone, *self.state.memory, self.state.sighted, self.known)
+        tensors = (self.state.lstm, *self.state.zone, *self.state.memory, self.state.target_seen, self.known)
         return sum(tensor.numel() * tensor.element_size() for tensor in tensors)
 
 

@@ -142,7 +142,7 @@ class Differentiator:
             unrolled.scene_logits,
             scenes,
             unrolled.imitation,
-            unrolled.sighted,
+            unrolled.target_seen,
         )
         self._parameters.gradients.zero_()
         loss.total.backward()  # type: ignore[no-untyped-call]

@@ -56,7 +56,7 @@ def a3c_loss(
     scene_logits: Tensor | None = None,
     scenes: Tensor | None = None,
     imitation: Imitation | None = None,
-    sighted: Tensor | None = None,
+    target_seen: Tensor | None = None,
 ) -> Loss:
     """Compute the loss of a rollout, averaged over the actions taken.
 
@@ -74,8 +74,8 @@ def a3c_loss(
         scene_logits: Of the scene layer, [T, B, S], if it is on.
         scenes: True scenes, int64 [T, B], the labels of `scene_logits`.
         imitation: What is to be taught the expert's actions besides, if anything is; the rollout then knows them.
-        sighted: Whether the target has been seen in the episode, bool [T, B]: there the policy is taught the expert's
-            actions, if the rollout knows them.
+        target_seen: Whether the target has been seen in the episode, bool [T, B]: there the policy is taught the
+            expert's actions, if the rollout knows them.
     """
     valid = rollout.valid.float()
     count = max(rollout.frames if rollout.taken is None else rollout.taken, 1)
@@ -104,8 +104,8 @@ def a3c_loss(
         counts = (imitation.counts & rollout.valid).unsqueeze(-1).expand(taught.shape[:-1])
         imitated = _surprise(taught, rollout.expert.unsqueeze(2).expand_as(taught), counts) / count
         total = total + weights.imitation * imitated
-    if sighted is not None and rollout.expert is not None and weights.approach > 0.0:
-        approached = _surprise(log_probabilities, rollout.expert, sighted & rollout.valid) / count
+    if target_seen is not None and rollout.expert is not None and weights.approach > 0.0:
+        approached = _surprise(log_probabilities, rollout.expert, target_seen & rollout.valid) / count
         total = total + weights.approach * approached
     terms = (policy, value, entropy, scene, imitated, approached)
     return Loss(total, *(term.item() for term in terms))

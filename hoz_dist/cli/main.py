@@ -130,12 +130,12 @@ def run(arguments: list[str]) -> int:
         error.show()
         return EXIT_USER_ERROR
     except (click.ClickException, HozError, OSError) as error:
-        click.echo(f"hoz-dist: {_sentence_of(error)}", err=True)
+        click.echo(f"hoz-dist: {sentence_of(error)}", err=True)
         return EXIT_USER_ERROR
     return result if isinstance(result, int) else 0
 
 
-def _sentence_of(error: click.ClickException | HozError | OSError) -> str:
+def sentence_of(error: click.ClickException | HozError | OSError) -> str:
     """Say on one line what is wrong."""
     match error:
         case click.UsageError():

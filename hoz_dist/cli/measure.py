@@ -70,6 +70,15 @@ def open_benchmark(
     return Benchmark.of([store.open(room, encoder) for room in names], split, episodes)
 
 
+def agent_of(checkpoint: Checkpoint, temperature: float = TEMPERATURE) -> PolicyAgent:
+    """Return the agent that a checkpoint holds.
+
+    Raises:
+        HozError: The checkpoint's parts do not fit, or it lacks the graphs that guide its agent.
+    """
+    return load_agent(checkpoint.config, checkpoint.parameters, checkpoint.scene_graphs(), temperature)
+
+
 def measure(
     checkpoint: Checkpoint,
     *,
@@ -103,7 +112,7 @@ def measure(
     # Results do not depend on the number of cores, and small products gain nothing from more threads.
     torch.set_num_threads(1)
     config = checkpoint.config
-    agent = load_agent(config, checkpoint.parameters, checkpoint.scene_graphs(), temperature)
+    agent = agent_of(checkpoint, temperature)
     benchmark = open_benchmark(checkpoint, split=split, episodes=episodes, scenes=scenes, weights=weights, cache=cache)
     trials = 2 * len(seeds) + 1  # of Random and the policy; Oracle draws nothing and has one
     with Progress("Evaluating", len(benchmark.episodes) * trials, "episodes") as progress:

@@ -65,7 +65,6 @@ def reproduce_command(
     and at most half a minute of the rest; the same command goes on.
     """
     from hoz_dist.reproduce.budget import BUDGETS
-    from hoz_dist.reproduce.job import jobs_of
     from hoz_dist.reproduce.tables import TABLES
 
     if budget not in BUDGETS:
@@ -75,6 +74,9 @@ def reproduce_command(
         return
     if table not in TABLES:
         raise UnknownNameError.of("table", table, TABLES)
+    from hoz_dist.reproduce.job import jobs_of, seeds_of
+    from hoz_dist.reproduce.row import BASELINES
+
     wanted, spend = TABLES[table], BUDGETS[budget]
     for name in rows:
         if name not in {row.name for row in wanted.rows}:
@@ -82,20 +84,23 @@ def reproduce_command(
     if rows and collect:
         message = "--row chooses what is trained and --collect trains nothing; leave out one of them."
         raise InvalidValueError(message)
+    if all(seeds == len(seeds_of(row, spend)) for row in wanted.rows if row.agent not in BASELINES):
+        seeds = None
     of_rows = {row.name: jobs_of(wanted, row, spend, None if seeds is None else range(seeds)) for row in wanted.rows}
     command = f"hoz-dist reproduce {table} --budget {budget}" + (f" --seeds {seeds}" if seeds else "")
     chosen = [job for name, jobs_of_row in of_rows.items() if not rows or name in rows for job in jobs_of_row]
     if not collect:
         with _alone(out):
             processes = jobs or len(os.sched_getaffinity(0))
-            finished = work_off(table, chosen, out, cache, processes, only_estimate=estimate, as_json=as_json)
+            finished = work_off(wanted, spend, chosen, out, cache, processes, only_estimate=estimate, as_json=as_json)
         if not finished:
             return
-    _show(wanted, spend, command, of_rows, out, docs, as_json=as_json)
+    _show(wanted, spend, command, of_rows, out, docs, seeds=seeds, as_json=as_json)
 
 
 def work_off(
-    table: str,
+    table: "Table",
+    budget: "Budget",
     jobs: "Sequence[Job]",
     out: Path,
     cache: Path | None,
@@ -107,7 +112,8 @@ def work_off(
     """Say how long jobs take, then do them.
 
     Args:
-        table: Name of the table that they are for.
+        table: The table that they are for.
+        budget: What every row gets.
         jobs: What is to do; finished ones are passed over.
         out: Folder of runs and results.
         cache: The view cache; the default one when None.
@@ -146,7 +152,8 @@ def work_off(
     if only_estimate:
         return False
     session: dict[str, Any] = {
-        "table": table,
+        "table": table.name,
+        "budget": budget.name,
         "runs": len(tasks),
         "jobs": processes,
         "measuring_seconds": round(time.monotonic() - began, 1),
@@ -174,13 +181,18 @@ def _show(
     out: Path,
     docs: Path | None,
     *,
+    seeds: int | None,
     as_json: bool,
 ) -> None:
     """Write the table's files, and print it."""
     from hoz_dist.cli.reproduce_results import Results, read_sessions
 
-    results = Results.read(table, budget, command, jobs, out)
-    sessions = [one for one in read_sessions(out / SESSIONS_FILE) if one["table"] == table.name]
+    results = Results.read(table, budget, command, jobs, out, seeds=seeds)
+    sessions = [
+        one
+        for one in read_sessions(out / SESSIONS_FILE)
+        if (one["table"], one.get("budget")) == (table.name, budget.name)
+    ]
     paths = results.write(out, sessions)
     if docs is not None:
         paths = results.write(docs, sessions)

@@ -11,7 +11,7 @@ from typing import Any, Final
 
 from hoz_dist.cli.progress import Progress
 from hoz_dist.cli.rendering import Encoding, render_rooms
-from hoz_dist.cli.reproduce_crew import Worker
+from hoz_dist.cli.reproduce_crew import OUR_MISTAKE, Worker
 from hoz_dist.errors import HozError
 from hoz_dist.nav.rooms import RoomId, training_rooms
 from hoz_dist.policy.encoders import load_encoder
@@ -91,9 +91,9 @@ def _speeds(trainings: Mapping[str, Task], cache: Path, jobs: int) -> dict[str, 
                         if not isinstance(message, Speed):
                             raise HozError(message.note)
                         speeds.append(message)
-                    if status not in {None, 0} and len(speeds) < len(wanted):
-                        failure = "A process that measures was killed, perhaps for want of memory; use fewer --jobs."
-                        raise HozError(failure)
+                    if status and len(speeds) < len(wanted):
+                        killed = "A process that measures was killed, perhaps for want of memory; use fewer --jobs."
+                        raise HozError(killed if status < 0 else OUR_MISTAKE)
                 progress.update(sum(map(len, measured.values())))
     finally:
         for worker in workers:

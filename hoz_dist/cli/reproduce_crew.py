@@ -13,6 +13,7 @@ from multiprocessing.context import SpawnContext
 from typing import Any, Final
 
 from hoz_dist.cli.child import die_with_parent
+from hoz_dist.cli.main import sentence_of
 from hoz_dist.cli.processes import MOST_RESTARTS, STOP_S
 from hoz_dist.cli.progress import Progress
 from hoz_dist.cli.reproduce_task import Place, Report, frames_of, perform
@@ -20,6 +21,8 @@ from hoz_dist.errors import HozError
 from hoz_dist.reproduce.costs import Costs, makespan
 from hoz_dist.reproduce.job import Task
 
+OUR_MISTAKE: Final = "A process of this command failed by a mistake of ours; what it says is above."
+"""Said when a process ended with a status above 0 and sent no reason; below 0 a signal killed it."""
 _POLL_S: Final = 1.0
 _SETTLED: Final = 0.05
 """Share of the work after which its speed tells more than the measurement before it."""
@@ -88,8 +91,8 @@ def _run(work: Callable[..., None], arguments: Sequence[Any], sending: Connectio
         work(*arguments, sending.send)
     except KeyboardInterrupt:
         stopped = True
-    except HozError as error:
-        sending.send(Report("failed", note=str(error)))
+    except (HozError, OSError) as error:
+        sending.send(Report("failed", note=sentence_of(error)))
         status = 1
     # Its children have stopped. From here on SIGTERM ends it as it ends any process: not as a failure.
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
@@ -126,8 +129,7 @@ class _Assignment:
         if status == 0:
             return True
         if status > 0:
-            message = "A process of this command failed by a mistake of ours; what it says is above."
-            raise HozError(message)
+            raise HozError(OUR_MISTAKE)
         if self._restarts >= MOST_RESTARTS:
             message = (
                 "A process of this command was killed again and again, perhaps for want of memory; use fewer --jobs."

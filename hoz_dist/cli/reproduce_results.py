@@ -22,6 +22,10 @@ class Results:
     table: Table
     budget: Budget
     command: str
+    seeds: int | None
+    """Training runs of each row; None when they are as the budget says."""
+    jobs: Mapping[str, Sequence[Job]]
+    """Of each row, finished or not."""
     outcomes: Mapping[str, Mapping[int, Outcome]]
     """By row and seed."""
     summaries: Mapping[str, RowSummary]
@@ -29,7 +33,14 @@ class Results:
 
     @classmethod
     def read(
-        cls, table: Table, budget: Budget, command: str, jobs: Mapping[str, Sequence[Job]], out: Path
+        cls,
+        table: Table,
+        budget: Budget,
+        command: str,
+        jobs: Mapping[str, Sequence[Job]],
+        out: Path,
+        *,
+        seeds: int | None = None,
     ) -> "Results":
         """Read what is finished.
 
@@ -39,6 +50,7 @@ class Results:
             command: The command that makes the table.
             jobs: Of each row.
             out: Folder of everything.
+            seeds: Training runs of each row; None when they are as the budget says.
 
         Raises:
             DamagedFileError: A file holds no outcome.
@@ -47,7 +59,18 @@ class Results:
             name: {job.seed: Outcome.load(job.result(out)) for job in of_row if job.result(out).exists()}
             for name, of_row in jobs.items()
         }
-        return cls(table, budget, command, outcomes, summarise(outcomes, table.references))
+        return cls(table, budget, command, seeds, jobs, outcomes, summarise(outcomes, table.references))
+
+    @property
+    def unfinished(self) -> dict[str, tuple[int, int]]:
+        """Number of results and of those wanted, by row that lacks some."""
+        numbers = {name: (len(self.outcomes[name]), len(of_row)) for name, of_row in self.jobs.items()}
+        return {name: (finished, wanted) for name, (finished, wanted) in numbers.items() if finished < wanted}
+
+    @property
+    def stem(self) -> str:
+        """What the table's files are called, less their suffixes; a table of fewer seeds is another one."""
+        return f"{self.table.name}-{self.budget.name}" + ("" if self.seeds is None else f"-seeds-{self.seeds}")
 
     @property
     def hours(self) -> float:
@@ -65,11 +88,14 @@ class Results:
 
     def text(self) -> str:
         """Return the table as Markdown."""
-        text = table_text(self.table, self.budget, self.summaries, self.command)
-        return f"{text}\n{self.hours:.1f} hours of runs in all.\n" if self.summaries else text
+        text = table_text(self.table, self.budget, self.summaries, self.command, self.unfinished)
+        if not self.summaries:
+            return text
+        folders = ", ".join(f"{name} `{self.jobs[name][0].result(Path()).parent}`" for name in self.summaries)
+        return f"{text}\n{self.hours:.1f} hours of runs in all. Every episode of each row, under `--out`: {folders}.\n"
 
     def to_json(self) -> dict[str, Any]:
-        """Return everything but the results of single episodes."""
+        """Return everything but the results of episodes, for which each run names its file in the folder."""
         papers = {row.name: row.paper for row in self.table.rows if row.paper is not None}
         return {
             "table": self.table.name,
@@ -77,6 +103,9 @@ class Results:
             "note": self.table.note,
             "command": self.command,
             "budget": asdict(self.budget),
+            "unfinished": {
+                name: {"finished": finished, "wanted": wanted} for name, (finished, wanted) in self.unfinished.items()
+            },
             "hours": round(self.hours, 2),
             "rows": {
                 name: {
@@ -87,7 +116,11 @@ class Results:
                     }
                     if name in papers
                     else None,
-                    "runs": {seed: dict(outcome.facts) for seed, outcome in self.outcomes[name].items()},
+                    "runs": {
+                        job.seed: {"file": str(job.result(Path())), **self.outcomes[name][job.seed].facts}
+                        for job in self.jobs[name]
+                        if job.seed in self.outcomes[name]
+                    },
                 }
                 for name, summary in self.summaries.items()
             },
@@ -101,8 +134,7 @@ class Results:
             sessions: How long each start of the command was expected to take, and took.
         """
         folder.mkdir(parents=True, exist_ok=True)
-        stem = folder / f"{self.table.name}-{self.budget.name}"
-        paths = [stem.with_suffix(".md"), stem.with_suffix(".json")]
+        paths = [folder / f"{self.stem}.md", folder / f"{self.stem}.json"]
         write_atomically(paths[0], self.text().encode(), overwrite=True)
         text = json.dumps(self.to_json() | {"sessions": list(sessions)}, indent=2) + "\n"
         write_atomically(paths[1], text.encode(), overwrite=True)
@@ -110,7 +142,7 @@ class Results:
             from hoz_dist.reproduce.plot import table_figure
             from hoz_dist.viz.zones import png
 
-            paths.append(stem.with_suffix(".png"))
+            paths.append(folder / f"{self.stem}.png")
             write_atomically(paths[2], png(table_figure(self.table, self.summaries)), overwrite=True)
         return paths
 

@@ -119,43 +119,40 @@ def _train(training: Training, place: Place, tell: Tell) -> None:
 
 def _choose(job: Job, training: Training, place: Place, tell: Tell) -> "tuple[Checkpoint, dict[str, Any]]":
     """Return the checkpoint that is best on validation rooms by SR, then SPL, then frames; and how it was chosen."""
-    from hoz_dist.evaluation.loading import load_agent
+    from hoz_dist.cli.measure import agent_of
     from hoz_dist.nav.metrics import metrics_of
-    from learner.checkpoint import FOLDER, KEPT_SUFFIX, SUFFIX, load_checkpoint
+    from learner.checkpoint import FOLDER, kept_checkpoints, load_checkpoint
 
-    file, folder = job.choice(place.out), training.folder(place.out) / FOLDER
+    file, run = job.choice(place.out), training.folder(place.out)
     if file.exists():
         choice = _read_json(file)
-        return load_checkpoint(folder / choice["checkpoint"]), choice
+        return load_checkpoint(run / FOLDER / choice["checkpoint"]), choice
     protocol, began = job.protocol, time.monotonic()
     benchmark = _benchmark(
         place, training.config.picture_size, protocol.rooms("val"), "val", protocol.validation_episodes
     )
     candidates: list[dict[str, Any]] = []
-    kept = sorted(folder.glob(f"*{KEPT_SUFFIX}"))[-protocol.candidates :]
-    for number, mark in enumerate(kept):
+    kept = kept_checkpoints(run, with_newest=True)[-protocol.candidates :]
+    for number, path in enumerate(kept):
         tell(Report("choosing", number / len(kept)))
-        checkpoint = load_checkpoint(mark.with_suffix(SUFFIX))
-        agent = load_agent(checkpoint.config, checkpoint.parameters, checkpoint.scene_graphs())
-        metrics = metrics_of(benchmark.run(agent, [0]).trials[0])
+        checkpoint = load_checkpoint(path)
+        metrics = metrics_of(benchmark.run(agent_of(checkpoint), [0]).trials[0])
         candidates.append(
-            {"checkpoint": mark.with_suffix(SUFFIX).name, "frames": checkpoint.frames}
+            {"checkpoint": path.name, "frames": checkpoint.frames}
             | {name: round(100 * getattr(metrics, name), 2) for name in ("sr", "spl", "sae")}
         )
-    if not candidates:
-        message = f"The run in '{folder.parent}' has kept no checkpoint; delete its folder, and start again."
-        raise NotFoundError(message)
     best = max(candidates, key=lambda one: (one["sr"], one["spl"], one["frames"]))
     choice = {"checkpoint": best["checkpoint"], "candidates": candidates, "seconds": time.monotonic() - began}
     _write_json(file, choice)
-    return load_checkpoint(folder / best["checkpoint"]), choice
+    return load_checkpoint(run / FOLDER / best["checkpoint"]), choice
 
 
 def _test(job: Job, place: Place, tell: Tell) -> None:
     """Test an agent on the test rooms, once for all, and keep what came of every episode."""
+    from hoz_dist.cli.measure import agent_of
     from hoz_dist.evaluation.agents import OracleAgent, RandomAgent
-    from hoz_dist.evaluation.loading import load_agent
     from hoz_dist.reproduce.outcome import Outcome
+    from learner.checkpoint import load_checkpoint
 
     facts: dict[str, Any] = {"agent": job.agent, "version": __version__, "cores": len(os.sched_getaffinity(0))}
     protocol, config = job.protocol, job.test_config
@@ -168,13 +165,14 @@ def _test(job: Job, place: Place, tell: Tell) -> None:
             "rooms_trained_in": list(job.training.scenes),
             "tested_with": dict(job.tested_with),
             "frames": checkpoint.frames,
-            "training_seconds": round(checkpoint.seconds, 1),
+            "training_seconds": round(load_checkpoint(job.training.folder(place.out)).seconds, 1),
+            "seconds_to_chosen": round(checkpoint.seconds, 1),
             "choice": choice,
         }
     benchmark = _benchmark(place, config.picture_size, protocol.rooms("test"), "test", protocol.test_episodes)
     agent: Agent
     if chosen is not None:
-        agent = load_agent(config, chosen.parameters, chosen.scene_graphs())
+        agent = agent_of(chosen)
     else:
         agent = RandomAgent() if job.agent == "random" else OracleAgent(list(benchmark.rooms))
     began = time.monotonic()

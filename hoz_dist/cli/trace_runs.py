@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final, NamedTuple
 
-from hoz_dist.cli.measure import open_benchmark
+from hoz_dist.cli.measure import agent_of, open_benchmark
 from hoz_dist.cli.progress import Progress
 from hoz_dist.config import RunConfig
 from hoz_dist.errors import InvalidValueError, NotFoundError
@@ -14,12 +14,11 @@ from hoz_dist.evaluation.analysis import Analysis
 from hoz_dist.evaluation.benchmark import Benchmark
 from hoz_dist.evaluation.episode_analysis import EpisodeAnalysis, analyse_episodes
 from hoz_dist.evaluation.learning_curve import LearningCurve
-from hoz_dist.evaluation.loading import load_agent
 from hoz_dist.evaluation.trace import EpisodeTrace, trace_episodes
 from hoz_dist.nav.metrics import metrics_of
 from hoz_dist.nav.rooms import Split
 from hoz_dist.viz.trajectory import Trajectory, trajectories_of
-from learner.checkpoint import FOLDER, KEPT_SUFFIX, Checkpoint, Stamp, checkpoint_files, load_checkpoint, reading
+from learner.checkpoint import Checkpoint, kept_checkpoints, load_checkpoint
 
 _MOST_COLUMNS: Final = 4
 """Agents whose ways are drawn side by side."""
@@ -101,7 +100,7 @@ def open_runs(
         HozError: A run cannot be read, keeps no checkpoint, or the runs cannot have the same episodes.
     """
     checkpoints = [load_checkpoint(path) for path in paths]
-    kept = [kept_checkpoints(path) if with_kept else () for path in paths]
+    kept = [_kept(path) if with_kept else () for path in paths]
     names = method_names(paths, [checkpoint.config for checkpoint in checkpoints])
     benchmarks = [
         open_benchmark(checkpoint, split=split, episodes=episodes, scenes=scenes, weights=weights, cache=cache)
@@ -141,23 +140,18 @@ def method_names(paths: Sequence[Path], configs: Sequence[RunConfig]) -> list[st
     return [f"{names[one]} ({paths[one]})" if names[one] in ambiguous else names[one] for one in first]
 
 
-def kept_checkpoints(path: Path) -> tuple[Path, ...]:
-    """Return the checkpoints that a run folder keeps for ever, one of each version, in the order of the training.
+def _kept(path: Path) -> tuple[Path, ...]:
+    """Return the checkpoints of a run's curve.
 
     Raises:
         NotFoundError: There is none.
         UnreadableError: The folder cannot be read now.
     """
-    kept: dict[int, Path] = {}
-    with reading(path):
-        for file in checkpoint_files(path / FOLDER):  # the newest first
-            stamp = Stamp.of(file)
-            if stamp is not None and file.with_suffix(KEPT_SUFFIX).exists():
-                kept.setdefault(stamp.version, file)
+    kept = kept_checkpoints(path)
     if not kept:
         message = f"'{path}' keeps no checkpoint for a curve; give a run folder that was trained with --keep-every."
         raise NotFoundError(message)
-    return tuple(file for _, file in sorted(kept.items()))
+    return kept
 
 
 def trace_runs(runs: Sequence[Run], seeds: Sequence[int]) -> TracedRuns:
@@ -186,7 +180,7 @@ def trace_runs(runs: Sequence[Run], seeds: Sequence[int]) -> TracedRuns:
         analyse(RandomAgent(), RandomAgent.name, benchmark, seeds[0])
         for run in runs:
             for seed in seeds:
-                traces = analyse(_agent(run.checkpoint), run.method, run.benchmark, seed)
+                traces = analyse(agent_of(run.checkpoint), run.method, run.benchmark, seed)
                 shown.setdefault(run.method, traces)
             if run.kept:
                 curves.setdefault(run.method, []).append(_curve(run, episodes))
@@ -222,16 +216,12 @@ class _Episodes(Progress):
         return traces
 
 
-def _agent(checkpoint: Checkpoint) -> Agent:
-    return load_agent(checkpoint.config, checkpoint.parameters, checkpoint.scene_graphs())
-
-
 def _curve(run: Run, episodes: _Episodes) -> LearningCurve:
     """Measure the kept checkpoints of a run."""
     frames, success = [], []
     for file in run.kept:
         checkpoint = load_checkpoint(file)
-        traces = episodes.trace(_agent(checkpoint), f"{run.method}, version {checkpoint.version}", run.benchmark, 0)
+        traces = episodes.trace(agent_of(checkpoint), f"{run.method}, version {checkpoint.version}", run.benchmark, 0)
         frames.append(checkpoint.frames)
         success.append(100.0 * metrics_of(trace.result for trace in traces).sr)
     return LearningCurve(tuple(frames), tuple(success))

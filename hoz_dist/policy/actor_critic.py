@@ -36,7 +36,7 @@ class State(NamedTuple):
     """Local copy of the scene graph; empty without the zone layer."""
     memory: Memory = ()
     """What the steering remembers of the episodes; empty without one."""
-    sighted: Tensor = torch.empty(0, dtype=torch.bool)
+    target_seen: Tensor = torch.empty(0, dtype=torch.bool)
     """Whether the target has been seen in the episode, bool [B]; decides what is taught, and is no input."""
 
     def select(self, episodes: Tensor) -> "State":
@@ -45,7 +45,7 @@ class State(NamedTuple):
             lstm=self.lstm[:, :, episodes],
             zone=ZoneState(*(part[episodes] for part in self.zone)),
             memory=tuple(part[episodes] for part in self.memory),
-            sighted=self.sighted[episodes],
+            target_seen=self.target_seen[episodes],
         )
 
 
@@ -75,7 +75,7 @@ class Unrolled(NamedTuple):
     """State after the rollout's last step, without gradient."""
     imitation: Imitation | None
     """What else is to be taught the expert's action, if anything is."""
-    sighted: Tensor
+    target_seen: Tensor
     """Whether the target has been seen in the episode, bool [T, B]."""
 
 
@@ -202,8 +202,8 @@ class ActorCritic(nn.Module):
         if self.steering is not None:
             steered = self._steer(logits, outputs, picture, inputs, first.unsqueeze(0), memory)
             logits, memory = steered.logits.squeeze(0), steered.memory
-        sighted = inputs.sees_target | (state.sighted & ~first)
-        return Decision(logits, value, State(tape.state, zone, memory, sighted), guidance)
+        target_seen = inputs.sees_target | (state.target_seen & ~first)
+        return Decision(logits, value, State(tape.state, zone, memory, target_seen), guidance)
 
     def unroll(
         self, observation: Observation, state: State, guidance: Guidance, bank: GraphBank, tape: Tape | None = None
@@ -240,14 +240,14 @@ class ActorCritic(nn.Module):
         steered = Steered(logits.view(steps, batch, -1), state.memory)
         if self.steering is not None:
             steered = self._steer(logits, outputs, picture, inputs, first, state.memory)
-        sighted = _ever(inputs.sees_target.view(steps, batch), first, state.sighted)
+        target_seen = _ever(inputs.sees_target.view(steps, batch), first, state.target_seen)
         return Unrolled(
             logits=steered.logits,
             values=values.view(steps, batch),
             scene_logits=None if scene_logits is None else scene_logits.view(steps, batch, -1),
-            state=State(tape.state, zone, tuple(part.detach() for part in steered.memory), sighted[-1]),
+            state=State(tape.state, zone, tuple(part.detach() for part in steered.memory), target_seen[-1]),
             imitation=steered.imitation,
-            sighted=sighted,
+            target_seen=target_seen,
         )
 
     def _scene_logits(self, picture: Tensor, inputs: _Inputs) -> Tensor | None:

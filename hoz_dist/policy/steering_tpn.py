@@ -82,7 +82,7 @@ class TentativePolicy(Steering):
 
         Returns:
             The number of steps made [B]; of each of the last M steps the key [B, M, D], the state [B, M, S], and the
-            action before it, one-hot [B, M, 7]; and dW [B, 6, H].
+            action before it, one-hot [B, M, 9]; and dW [B, 6, H].
         """
         return (
             torch.zeros(batch, dtype=torch.int64),
@@ -126,7 +126,7 @@ class TentativePolicy(Steering):
 
         Args:
             states: [B, M + T, S].
-            actions: The one before each step, one-hot [B, M + T, 7].
+            actions: The one before each step, one-hot [B, M + T, 9].
             remembered: What each of T steps remembers of all, bool [B, T, M + T].
         """
         here = states[:, REMEMBERED:]

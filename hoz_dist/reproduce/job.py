@@ -11,19 +11,22 @@ A job is known by digests of everything that shapes it, so a table finds what an
 import hashlib
 import json
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
 from hoz_dist.config import RunConfig
+from hoz_dist.evaluation.agents import TEMPERATURE
+from hoz_dist.evaluation.benchmark import EPISODE_SEED
 from hoz_dist.nav.categories import scenes_to_tell
+from hoz_dist.nav.reward import STEP_REWARD, SUCCESS_REWARD
 from hoz_dist.nav.rooms import RoomId, Split, rooms_of, training_rooms
 from hoz_dist.reproduce.budget import Budget
 from hoz_dist.reproduce.row import BASELINES, Row, Table
 from hoz_dist.sim.catalogue import recorded_digest
 
 RECIPE: Final = 2
-"""Raise it when training or evaluation change in a way that no configuration tells, so that all is done again."""
+"""Raise it when training or evaluation change in a way that no digest here tells, so that all is done again."""
 _DIGEST_LETTERS: Final = 12
 
 
@@ -56,6 +59,8 @@ class Training:
             {
                 "recipe": RECIPE,
                 "config": values,
+                "sizes": asdict(self.config.policy.sizes),
+                "rewards": [STEP_REWARD, SUCCESS_REWARD],
                 "rooms": _content(training_rooms(self.scenes)),
                 "keep": self.keep_every,
             }
@@ -85,7 +90,8 @@ class Protocol:
     @property
     def choice_digest(self) -> str:
         """Tells how a checkpoint is chosen."""
-        return _digest([self.candidates, self.validation_episodes, _content(self.rooms("val"))])
+        episodes = [self.validation_episodes, EPISODE_SEED, _content(self.rooms("val"))]
+        return _digest([self.candidates, TEMPERATURE, episodes])
 
 
 @dataclass(frozen=True)
@@ -108,10 +114,10 @@ class Job:
     def digest(self) -> str:
         """Tells this job from others of whatever seed."""
         protocol = self.protocol
-        test = [protocol.test_episodes, protocol.trials, _content(protocol.rooms("test"))]
+        test = [protocol.test_episodes, protocol.trials, EPISODE_SEED, _content(protocol.rooms("test"))]
         if self.training is None:
             return _digest([RECIPE, self.agent, test])
-        return _digest([self.training.digest, protocol.choice_digest, test, sorted(self.tested_with)])
+        return _digest([self.training.digest, protocol.choice_digest, test, TEMPERATURE, sorted(self.tested_with)])
 
     @property
     def test_config(self) -> RunConfig:
@@ -167,7 +173,7 @@ def jobs_of(table: Table, row: Row, budget: Budget, seeds: Sequence[int] | None 
     )
     if row.agent in BASELINES:
         return (Job(row.agent, None, protocol),)
-    wanted = range(budget.key_seeds if row.key else budget.seeds) if seeds is None else seeds
+    wanted = seeds_of(row, budget) if seeds is None else seeds
     frames = budget.frames(table.scenes)
     recipe = RunConfig(preset="medium", frames=frames, approach_frames=frames, scenes=scenes_to_tell(scenes))
     config = RunConfig.from_json(recipe.to_json() | {"method": row.agent, **_as_json(row.options)})
@@ -176,6 +182,11 @@ def jobs_of(table: Table, row: Row, budget: Budget, seeds: Sequence[int] | None 
         Job(row.agent, Training(replace(config, seed=seed), table.scenes, budget.checkpoints), protocol, tested_with)
         for seed in wanted
     )
+
+
+def seeds_of(row: Row, budget: Budget) -> range:
+    """Return the seeds that a budget has a row trained with."""
+    return range(budget.key_seeds if row.key else budget.seeds)
 
 
 def tasks_of(jobs: Iterable[Job], out: Path) -> tuple[Task, ...]:

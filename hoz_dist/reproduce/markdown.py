@@ -7,13 +7,19 @@ from typing import Final
 from hoz_dist.reproduce.bootstrap import CONFIDENCE, REPLICATES, Interval
 from hoz_dist.reproduce.budget import Budget
 from hoz_dist.reproduce.outcome import METRICS
-from hoz_dist.reproduce.row import Figures, Paper, Row, Table
+from hoz_dist.reproduce.row import BASELINES, Figures, Paper, Row, Table
 from hoz_dist.reproduce.summary import RowSummary, Spread
 
 _NOTHING: Final = "-"
 
 
-def table_text(table: Table, budget: Budget, summaries: Mapping[str, RowSummary], command: str) -> str:
+def table_text(
+    table: Table,
+    budget: Budget,
+    summaries: Mapping[str, RowSummary],
+    command: str,
+    unfinished: Mapping[str, tuple[int, int]],
+) -> str:
     """Write a table's results as Markdown.
 
     Args:
@@ -21,9 +27,12 @@ def table_text(table: Table, budget: Budget, summaries: Mapping[str, RowSummary]
         budget: What every row got.
         summaries: By row; rows without results are left out.
         command: What made the results.
+        unfinished: Number of results and of those wanted, by row that lacks some.
     """
     rows = [row for row in table.rows if row.name in summaries]
     lines = [f"# {table.title}", ""]
+    if unfinished:
+        lines += [_unfinished(table, unfinished), ""]
     if not rows:
         return "\n".join([*lines, "No results yet.", ""])
     lines += [_protocol(table, budget, summaries, command), ""]
@@ -33,11 +42,21 @@ def table_text(table: Table, budget: Budget, summaries: Mapping[str, RowSummary]
     if table.alike:
         lines += ["", _spread_of_rows(table, summaries)]
     for reference in table.references:
-        compared = [row.name for row in rows if reference in summaries[row.name].differences]
+        compared = [row for row in rows if reference in summaries[row.name].differences]
         if compared:
             lines += ["", f"## Differences from {reference}", "", _kind(compared, reference, summaries), ""]
-            lines += _differences(compared, reference, summaries)
+            lines += _differences([row.name for row in compared], reference, summaries)
     return "\n".join([*lines, ""])
+
+
+def _unfinished(table: Table, unfinished: Mapping[str, tuple[int, int]]) -> str:
+    """Say in one line which rows lack results."""
+    rows = []
+    for row in table.rows:
+        if row.name in unfinished:
+            finished, wanted = unfinished[row.name]
+            rows.append(f"{row.name} {'untested' if row.agent in BASELINES else f'{finished} of {wanted} seeds'}")
+    return f"Unfinished: {', '.join(rows)}."
 
 
 def _protocol(table: Table, budget: Budget, summaries: Mapping[str, RowSummary], command: str) -> str:
@@ -59,7 +78,7 @@ def _figures(rows: Sequence[Row], summaries: Mapping[str, RowSummary]) -> list[s
     cells = []
     for row in rows:
         summary = summaries[row.name]
-        line = [row.name, str(len(summary.seeds)) if summary.seeds and row.agent not in {"random", "oracle"} else "-"]
+        line = [row.name, str(len(summary.seeds)) if summary.seeds and row.agent not in BASELINES else "-"]
         for part in ("all", "long"):
             spreads = summary.spreads.get(part, {})
             line += [_spread(spreads.get(metric)) for metric in METRICS]
@@ -80,13 +99,14 @@ def _differences(compared: Iterable[str], reference: str, summaries: Mapping[str
     return aligned(["row", "SR", "SPL", "SAE", "L>=5: SR", "SPL", "SAE"], cells)
 
 
-def _kind(compared: Sequence[str], reference: str, summaries: Mapping[str, RowSummary]) -> str:
+def _kind(compared: Sequence[Row], reference: str, summaries: Mapping[str, RowSummary]) -> str:
     """Say what the intervals are of."""
     own = len(summaries[reference].seeds)
-    single = [name for name in compared if min(own, len(summaries[name].seeds)) == 1]
+    trained = [row.name for row in compared if row.agent not in BASELINES]
+    single = [name for name in trained if min(own, len(summaries[name].seeds)) == 1]
     text = (
         f"Percent points with {CONFIDENCE:.0%} intervals: {REPLICATES} bootstrap replicates over seeds (paired where "
-        "both rows have the same) and episodes (always paired)."
+        "both rows have the same; stretched by Student's t, as they are few) and episodes (always paired)."
     )
     if single:
         text += f" Of one seed on either side, so hardly anything about another training: {', '.join(single)}."

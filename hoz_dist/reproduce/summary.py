@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hoz_dist.errors import InvalidValueError
 from hoz_dist.reproduce.bootstrap import Interval, Resampling
 from hoz_dist.reproduce.outcome import METRICS, Outcome
 
@@ -79,15 +80,21 @@ def summarise(outcomes: Mapping[str, Mapping[int, Outcome]], references: Sequenc
         By row, in the same order.
 
     Raises:
-        ValueError: Two outcomes are not of the same episodes.
+        InvalidValueError: Two outcomes are not of the same episodes.
     """
     present = {name: by_seed for name, by_seed in outcomes.items() if by_seed}
     if not present:
         return {}
-    first = next(iter(next(iter(present.values())).values()))
-    if not all(first.same_episodes(one) for by_seed in present.values() for one in by_seed.values()):
-        message = "outcomes of different episodes cannot be compared"
-        raise ValueError(message)
+    first_name, first_seed = next((name, seed) for name, by_seed in present.items() for seed in by_seed)
+    first = present[first_name][first_seed]
+    for name, by_seed in present.items():
+        for seed, one in by_seed.items():
+            if not first.same_episodes(one):
+                message = (
+                    f"The results of '{first_name}' with seed {first_seed} and of '{name}' with seed {seed} are of "
+                    "different episodes, so they cannot be compared; delete the older ones, and start again."
+                )
+                raise InvalidValueError(message)
     masks = {"all": np.ones(len(first.optimal), dtype=np.bool_), "long": first.long}
     masks = {part: mask for part, mask in masks.items() if mask.any()}
     draws = {part: Resampling(int(mask.sum())) for part, mask in masks.items()}

@@ -64,6 +64,14 @@ def default_cache() -> Path:
     return Path(os.environ.get("HOZ_CACHE") or platformdirs.user_cache_dir("hoz-dist"))
 
 
+def sources_digest(encoder: VisualEncoder) -> str:
+    """Tell whether the source texts that shape pictures, and what is derived from them with an encoder, are the same.
+
+    The content of rooms, which `recorded_digest` tells, has no part in it.
+    """
+    return _short_digest(_sources_digest(_PICTURE_SOURCES), _derived_name(encoder))
+
+
 class ViewStore:
     """Opens rooms from the view cache and renders what is missing there."""
 

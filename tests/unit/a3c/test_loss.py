@@ -104,52 +104,54 @@ def approaching() -> tuple[Rollout, torch.Tensor]:
     expert[..., 2] = True
     expert[0, 0, 4] = True
     expert[:, 2] = False
-    sighted = torch.tensor([[True, True, True, False], [True, False, True, False]])
-    return replace(rollout, expert=expert), sighted
+    target_seen = torch.tensor([[True, True, True, False], [True, False, True, False]])
+    return replace(rollout, expert=expert), target_seen
 
 
-def gradient_of(rollout: Rollout, sighted: torch.Tensor | None, weight: float, logits: torch.Tensor) -> torch.Tensor:
+def gradient_of(
+    rollout: Rollout, target_seen: torch.Tensor | None, weight: float, logits: torch.Tensor
+) -> torch.Tensor:
     """Gradient of the loss by the policy's logits, [T, B, 6]."""
     logits = logits.clone().requires_grad_()
     weights = WEIGHTS._replace(approach=weight)
-    a3c_loss(rollout, logits, torch.zeros(2, 4), weights, sighted=sighted).total.backward()  # type: ignore[no-untyped-call]
+    a3c_loss(rollout, logits, torch.zeros(2, 4), weights, target_seen=target_seen).total.backward()  # type: ignore[no-untyped-call]
     assert logits.grad is not None
     return logits.grad
 
 
 def test_the_approach_is_taught_once_the_target_was_seen_and_nowhere_else() -> None:
     """Where the step was taken and a path exists."""
-    rollout, sighted = approaching()
+    rollout, target_seen = approaching()
     logits = torch.randn(2, 4, 6, generator=torch.Generator().manual_seed(0))
-    taught = gradient_of(rollout, sighted, 0.5, logits) - gradient_of(rollout, None, 0.5, logits)
+    taught = gradient_of(rollout, target_seen, 0.5, logits) - gradient_of(rollout, None, 0.5, logits)
     assert (taught.abs().amax(dim=-1) > 1e-6).nonzero().tolist() == [[0, 0], [1, 0]]
     assert (taught[0, 0] < 0).nonzero().flatten().tolist() == [2, 4], "any of the shortest ways will do"
     assert (taught[1, 0] < 0).nonzero().flatten().tolist() == [2]
 
 
 def test_the_approach_is_the_surprise_at_doing_any_of_what_the_expert_might() -> None:
-    rollout, sighted = approaching()
+    rollout, target_seen = approaching()
     arguments = (rollout, torch.zeros(2, 4, 6), torch.zeros(2, 4))
-    loss = a3c_loss(*arguments, WEIGHTS._replace(approach=0.5), sighted=sighted)
+    loss = a3c_loss(*arguments, WEIGHTS._replace(approach=0.5), target_seen=target_seen)
     without = a3c_loss(*arguments, WEIGHTS)
     assert loss.approach == pytest.approx((math.log(6 / 2) + math.log(6)) / 7, rel=1e-5)
     assert loss.total.item() == pytest.approx(without.total.item() + 0.5 * loss.approach, rel=1e-5)
 
 
 def test_without_weight_labels_or_sight_the_loss_is_what_it_was() -> None:
-    rollout, sighted = approaching()
+    rollout, target_seen = approaching()
     unlabelled = replace(rollout, expert=None)
     logits = torch.randn(2, 4, 6, generator=torch.Generator().manual_seed(1))
     plain = gradient_of(unlabelled, None, 0.0, logits)
-    assert torch.equal(gradient_of(rollout, sighted, 0.0, logits), plain)
-    assert torch.equal(gradient_of(unlabelled, sighted, 0.5, logits), plain)
-    assert torch.equal(gradient_of(rollout, torch.zeros_like(sighted), 0.5, logits), plain)
+    assert torch.equal(gradient_of(rollout, target_seen, 0.0, logits), plain)
+    assert torch.equal(gradient_of(unlabelled, target_seen, 0.5, logits), plain)
+    assert torch.equal(gradient_of(rollout, torch.zeros_like(target_seen), 0.5, logits), plain)
 
 
 def test_what_a_policy_never_does_is_taught_by_a_finite_gradient() -> None:
-    rollout, sighted = approaching()
+    rollout, target_seen = approaching()
     logits = torch.zeros(2, 4, 6)
     logits[..., 2] = logits[..., 4] = -1e4
-    gradient = gradient_of(rollout, sighted, 0.5, logits)
+    gradient = gradient_of(rollout, target_seen, 0.5, logits)
     assert gradient.isfinite().all()
     assert (gradient[0, 0, [2, 4]] < 0).all()

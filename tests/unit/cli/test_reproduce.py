@@ -53,6 +53,30 @@ def test_results_are_read_written_and_counted_once(tmp_path: Path) -> None:
     paths = results.write(tmp_path / "docs", [{"estimated_seconds": 3.0, "took_seconds": 3.5}])
     assert [path.name for path in paths] == ["some-tiny.md", "some-tiny.json", "some-tiny.png"]
     written = json.loads(paths[1].read_text())
+    assert written["unfinished"]["hoz"] == {"finished": 2, "wanted": 3}
+    assert written["unfinished"]["object"] == {"finished": 0, "wanted": 1}
+    assert "object 0 of 1 seeds" in paths[0].read_text()
     assert written["sessions"] == [{"estimated_seconds": 3.0, "took_seconds": 3.5}]
     assert written["rows"]["hoz"]["runs"]["1"]["training_seconds"] == 60.0
     assert written["rows"]["hoz"]["seeds"] == [0, 1]
+    for seed, job in enumerate(jobs["hoz"][:2]):
+        assert tmp_path / written["rows"]["hoz"]["runs"][str(seed)]["file"] == job.result(tmp_path)
+    folder = jobs["other order"][0].result(tmp_path).parent.relative_to(tmp_path)
+    assert f"other order `{folder}`" in paths[0].read_text()
+
+
+def test_a_table_shows_the_sessions_of_its_own_budget(tmp_path: Path) -> None:
+    sessions = [
+        {"table": table, "budget": budget, "took_seconds": number}
+        for number, (table, budget) in enumerate([("zones", "quick"), ("zones", "full"), ("methods", "quick")])
+    ]
+    (tmp_path / "sessions.json").write_text(json.dumps(sessions))
+    assert run(["reproduce", "zones", "--budget", "full", "--collect", "--out", str(tmp_path)]) == 0
+    assert json.loads((tmp_path / "zones-full.json").read_text())["sessions"] == [sessions[1]]
+
+
+@pytest.mark.parametrize(("seeds", "stem"), [(2, "methods-full-seeds-2"), (5, "methods-full")])
+def test_a_table_of_other_seeds_does_not_overwrite_the_whole_one(tmp_path: Path, seeds: int, stem: str) -> None:
+    words = ["reproduce", "methods", "--budget", "full", "--collect", "--out", str(tmp_path), "--seeds", str(seeds)]
+    assert run(words) == 0
+    assert {path.name for path in tmp_path.iterdir()} == {f"{stem}.md", f"{stem}.json"}

@@ -11,10 +11,12 @@ from safetensors.numpy import load_file, save_file
 
 from hoz_dist.errors import DamagedFileError, InvalidValueError, NotFoundError
 from learner.checkpoint import (
+    FOLDER,
     Checkpoint,
     Stamp,
     UnreadableError,
     checkpoint_files,
+    kept_checkpoints,
     load_checkpoint,
     newest_readable,
     save_checkpoint,
@@ -104,6 +106,18 @@ def test_of_a_finished_run_that_is_opened_again_and_again_the_last_end_is_kept(
         save_checkpoint(tmp_path, replace(checkpoint, epoch=epoch, version=9), keep=True)
     assert [Stamp.of(path) for path in checkpoint_files(tmp_path)] == [(8, 9), (7, 9), (6, 9), (5, 9)]
     assert len(list(tmp_path.glob("*.keep"))) == 4
+
+
+def test_kept_checkpoints_are_of_one_training_each_version_once(tmp_path: Path, checkpoint: Checkpoint) -> None:
+    # The end of epoch 2 is damaged, epoch 3 goes on without it; epochs 4 and 5 open the finished run.
+    for epoch, version in ((1, 10), (2, 20), (2, 31), (3, 30), (4, 30), (5, 30)):
+        save_checkpoint(tmp_path / FOLDER, replace(checkpoint, epoch=epoch, version=version), keep=True)
+    kept = [Stamp.of(path) for path in kept_checkpoints(tmp_path)]
+    assert kept == [(1, 10), (2, 20), (5, 30)]
+    save_checkpoint(tmp_path / FOLDER, replace(checkpoint, epoch=5, version=40))
+    assert [Stamp.of(path) for path in kept_checkpoints(tmp_path)] == kept
+    assert [Stamp.of(path) for path in kept_checkpoints(tmp_path, with_newest=True)] == [*kept, (5, 40)]
+    assert kept_checkpoints(tmp_path / "elsewhere", with_newest=True) == ()
 
 
 def test_a_learner_that_is_deposed_before_it_deletes_what_is_too_old_does_not_delete_it(

@@ -49,10 +49,10 @@ def test_one_that_is_too_large_is_kept_alone() -> None:
 def test_what_is_kept_is_in_memory_of_its_own() -> None:
     parts = torch.zeros(20, 2, 1, 3, 4)
     seen = torch.ones(20, 3, dtype=torch.bool)
-    state = State(parts[-1], initial_zone_state(3, 2), sighted=seen[-1])
+    state = State(parts[-1], initial_zone_state(3, 2), target_seen=seen[-1])
     kept = Ended.after(gradient_push(), state, torch.ones(5, 3, dtype=torch.bool)[-1])
     assert kept.state.lstm.untyped_storage().nbytes() == kept.state.lstm.numel() * 4
     assert kept.known.untyped_storage().nbytes() == 3
-    assert kept.state.sighted.tolist() == [True] * 3
-    assert kept.state.sighted.untyped_storage().nbytes() == 3
-    assert kept.size == sum(part.nbytes for part in (*state.zone, state.lstm, state.sighted, kept.known))
+    assert kept.state.target_seen.tolist() == [True] * 3
+    assert kept.state.target_seen.untyped_storage().nbytes() == 3
+    assert kept.size == sum(part.nbytes for part in (*state.zone, state.lstm, state.target_seen, kept.known))

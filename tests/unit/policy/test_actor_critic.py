@@ -73,8 +73,8 @@ def check_unrolling(config: RunConfig, bank: GraphBank) -> None:
     assert len(unrolled.state.memory) == len(after.memory)
     for mine, theirs in zip(unrolled.state.memory, after.memory, strict=True):
         torch.testing.assert_close(mine, theirs, atol=1e-5, rtol=1e-4)
-    assert torch.equal(unrolled.sighted, torch.stack([decision.state.sighted for decision in decisions]))
-    assert torch.equal(unrolled.state.sighted, after.sighted)
+    assert torch.equal(unrolled.target_seen, torch.stack([decision.state.target_seen for decision in decisions]))
+    assert torch.equal(unrolled.state.target_seen, after.target_seen)
 
 
 def test_that_the_target_was_seen_lasts_for_the_episode_over_rollouts(bank: GraphBank) -> None:
@@ -83,17 +83,17 @@ def test_that_the_target_was_seen_lasts_for_the_episode_over_rollouts(bank: Grap
     observation = make_observation(steps, batch)
     policy = make_policy(CONFIG.policy, 0)
     decisions = act_over(policy, observation, policy.initial_state(batch), bank)
-    sighted = torch.stack([decision.state.sighted for decision in decisions])
+    target_seen = torch.stack([decision.state.target_seen for decision in decisions])
     for slot in range(batch):
         seen = False
         for t in range(steps):
             now = bool(observation.detections[t, slot, observation.target[t, slot], 4] > 0)
             seen = now or (seen and not observation.first[t, slot])
-            assert bool(sighted[t, slot]) == seen
+            assert bool(target_seen[t, slot]) == seen
     for t in (STEPS, 2 * STEPS):
         sees = torch.from_numpy(observation.detections[t, range(batch), observation.target[t], 4] > 0)
-        assert (sighted[t] & ~sees).any(), "sight lasts from one rollout to the next"
-    assert (sighted[:-1] & ~sighted[1:]).any(), "and ends with the episode"
+        assert (target_seen[t] & ~sees).any(), "sight lasts from one rollout to the next"
+    assert (target_seen[:-1] & ~target_seen[1:]).any(), "and ends with the episode"
     state, found = policy.initial_state(batch), []
     for start in range(0, steps, STEPS):
         part = slice(start, start + STEPS)
@@ -101,8 +101,8 @@ def test_that_the_target_was_seen_lasts_for_the_episode_over_rollouts(bank: Grap
         with torch.no_grad():
             unrolled = policy.unroll(Observation._make(values[part] for values in observation), state, guidance, bank)
         state = unrolled.state
-        found.append(unrolled.sighted)
-    assert torch.equal(torch.cat(found), sighted)
+        found.append(unrolled.target_seen)
+    assert torch.equal(torch.cat(found), target_seen)
 
 
 @pytest.mark.skipif(dtype_of("bf16") != torch.bfloat16, reason="the processor has no products of bf16")

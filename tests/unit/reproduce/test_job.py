@@ -4,11 +4,14 @@ from pathlib import Path
 import pytest
 
 from hoz_dist.errors import HozError
+from hoz_dist.policy.encoders import load_encoder
+from hoz_dist.policy.settings import PRESETS
 from hoz_dist.reproduce import job
 from hoz_dist.reproduce.budget import BUDGETS
 from hoz_dist.reproduce.job import Job, jobs_of, tasks_of
 from hoz_dist.reproduce.row import Row
 from hoz_dist.reproduce.tables import TABLES
+from hoz_dist.sim.view_store import sources_digest
 from tests.unit.reproduce.making import TABLE, TINY
 
 OUT = Path("out")
@@ -67,6 +70,41 @@ def test_another_recipe_or_other_rooms_do_everything_anew(monkeypatch: pytest.Mo
     recipe = one(HOZ).digest
     monkeypatch.setattr(job, "recorded_digest", lambda room: f"other {room}")
     assert len({before, recipe, one(HOZ).digest}) == 3
+
+
+@pytest.mark.parametrize("constant", ["STEP_REWARD", "SUCCESS_REWARD"])
+def test_another_reward_trains_anew(monkeypatch: pytest.MonkeyPatch, constant: str) -> None:
+    before = one(HOZ)
+    folder, result = before.training.folder(OUT) if before.training else OUT, before.result(OUT)
+    monkeypatch.setattr(job, constant, 0.5)
+    assert before.training is not None
+    assert before.training.folder(OUT) != folder
+    assert before.result(OUT) != result
+
+
+def test_other_layer_sizes_train_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+    before = one(HOZ).digest
+    monkeypatch.setitem(PRESETS, "medium", replace(PRESETS["medium"], lstm=300))
+    assert one(HOZ).digest != before
+
+
+@pytest.mark.parametrize(("constant", "shapes_random"), [("TEMPERATURE", False), ("EPISODE_SEED", True)])
+def test_other_evaluations_choose_and_test_anew_but_train_no_more(
+    monkeypatch: pytest.MonkeyPatch, constant: str, *, shapes_random: bool
+) -> None:
+    trained, random = one(HOZ), one(TABLE.rows[0])
+    assert trained.training is not None
+    before = (trained.training.digest, trained.choice(OUT), trained.result(OUT), random.result(OUT))
+    monkeypatch.setattr(job, constant, 7)
+    after = (trained.training.digest, trained.choice(OUT), trained.result(OUT), random.result(OUT))
+    assert [one != other for one, other in zip(before, after, strict=True)] == [False, True, True, shapes_random]
+
+
+def test_pictures_and_what_is_derived_from_them_are_those_of_the_recipe() -> None:
+    assert (job.RECIPE, sources_digest(load_encoder("pooled"))) == (2, "ec520ba55bb63eab"), (
+        "sources that shape pictures have changed: if pictures or detections change, raise RECIPE; "
+        "then write the new digest here"
+    )
 
 
 def test_tasks_put_tests_of_one_training_together_and_seeds_first(tmp_path: Path) -> None:

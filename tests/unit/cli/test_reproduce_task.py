@@ -1,0 +1,58 @@
+import json
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from hoz_dist.cli import measure, reproduce_task
+from hoz_dist.cli.reproduce_task import Place, Report
+from hoz_dist.evaluation.trials import Evaluation
+from hoz_dist.nav.episode import EpisodeResult
+from hoz_dist.nav.rooms import RoomId
+from hoz_dist.reproduce.job import Job, jobs_of
+from hoz_dist.reproduce.outcome import Outcome
+from learner.checkpoint import FOLDER, save_checkpoint
+from learner.core import LearnerCore
+from tests.unit.learner.making import CONFIG, vector
+from tests.unit.reproduce.making import TABLE, TINY
+
+
+@pytest.fixture
+def benchmark(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every agent fails in the same way."""
+    failure = EpisodeResult(RoomId("bathroom", 21), 0, success=False, actions=9, moves=3, said_done=True, optimal=4)
+    trials = Evaluation("object", "val", ((failure,),))
+    monkeypatch.setattr(measure, "load_agent", lambda *_: None)
+    monkeypatch.setattr(reproduce_task, "_benchmark", lambda *_: SimpleNamespace(run=lambda *_, **__: trials))
+
+
+@pytest.fixture
+def job(tmp_path: Path) -> Job:
+    """Learners were killed: two after they had kept version 30, one between writing the end and its mark."""
+    job = jobs_of(TABLE, TABLE.rows[1], TINY)[0]
+    assert job.training is not None
+    made = LearnerCore(CONFIG, vector(0), epoch=1).snapshot(now=5.0)
+    for epoch, version, keep in ((1, 10, True), (1, 20, True), (2, 30, True), (3, 30, True), (3, 40, False)):
+        one = replace(made, epoch=epoch, version=version, frames=100 * version, seconds=version)
+        save_checkpoint(job.training.folder(tmp_path) / FOLDER, one, keep=keep)
+    return job
+
+
+@pytest.mark.usefixtures("benchmark")
+def test_candidates_are_the_last_that_differ_and_the_end_among_them(tmp_path: Path, job: Job) -> None:
+    assert job.training is not None
+    reports: list[Report] = []
+    chosen, choice = reproduce_task._choose(job, job.training, Place(tmp_path, tmp_path), reports.append)
+    assert [one["frames"] for one in choice["candidates"]] == [2000, 3000, 4000]
+    assert chosen.version == 40
+    assert [report.share for report in reports] == pytest.approx([0, 1 / 3, 2 / 3])
+
+
+@pytest.mark.usefixtures("benchmark")
+def test_a_result_tells_the_time_of_the_whole_training_and_that_to_the_checkpoint(tmp_path: Path, job: Job) -> None:
+    choice = job.choice(tmp_path)
+    choice.write_text(json.dumps({"checkpoint": "0001-000000020.safetensors", "seconds": 1.0}))
+    reproduce_task._test(job, Place(tmp_path, tmp_path), lambda _: None)
+    facts = Outcome.load(job.result(tmp_path)).facts
+    assert (facts["frames"], facts["seconds_to_chosen"], facts["training_seconds"]) == (2000, 20.0, 40.0)
