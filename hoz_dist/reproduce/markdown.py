@@ -11,6 +11,10 @@ from hoz_dist.reproduce.row import BASELINES, Figures, Paper, Row, Table
 from hoz_dist.reproduce.summary import RowSummary, Spread
 
 _NOTHING: Final = "-"
+_METRICS: Final = ("SR", "SPL", "SAE", "SR, L>=5", "SPL, L>=5", "SAE, L>=5")
+_ONE_SEED: Final = "†"
+_JUDGED: Final = ("sr", "spl")
+"""Metrics of which the sentence above the differences tells."""
 
 
 def table_text(
@@ -44,8 +48,9 @@ def table_text(
     for reference in table.references:
         compared = [row for row in rows if reference in summaries[row.name].differences]
         if compared:
-            lines += ["", f"## Differences from {reference}", "", _kind(compared, reference, summaries), ""]
-            lines += _differences([row.name for row in compared], reference, summaries)
+            lines += ["", f"## Differences from {reference}", "", *_verdicts(compared, reference, summaries), ""]
+            lines += _differences(compared, reference, summaries)
+            lines += ["", _kind(compared, reference, summaries)]
     return "\n".join([*lines, ""])
 
 
@@ -73,8 +78,8 @@ def _protocol(table: Table, budget: Budget, summaries: Mapping[str, RowSummary],
 def _figures(rows: Sequence[Row], summaries: Mapping[str, RowSummary]) -> list[str]:
     """Write means and deviations, and the paper's figures if it has any of these rows."""
     with_paper = any(row.paper is not None for row in rows)
-    header = ["row", "seeds", "SR", "SPL", "SAE", "L>=5: SR", "SPL", "SAE"]
-    header += ["paper: SR/SPL/SAE", "L>=5"] if with_paper else []
+    header = ["row", "seeds", *_METRICS]
+    header += ["paper: SR/SPL/SAE", "paper, L>=5"] if with_paper else []
     cells = []
     for row in rows:
         summary = summaries[row.name]
@@ -88,28 +93,50 @@ def _figures(rows: Sequence[Row], summaries: Mapping[str, RowSummary]) -> list[s
     return aligned(header, cells)
 
 
-def _differences(compared: Iterable[str], reference: str, summaries: Mapping[str, RowSummary]) -> list[str]:
+def _verdicts(compared: Sequence[Row], reference: str, summaries: Mapping[str, RowSummary]) -> list[str]:
+    """Say in a line for each metric which rows are better and worse than the reference in long episodes."""
+    lines = []
+    for metric in _JUDGED:
+        better, worse, alike, unknown = list[str](), list[str](), list[str](), list[str]()
+        for row in compared:
+            interval = summaries[row.name].differences[reference].get("long", {}).get(metric)
+            if interval is None or _of_one_seed(row, reference, summaries):
+                unknown.append(row.name)
+            else:
+                (better if interval.low > 0 else worse if interval.high < 0 else alike).append(row.name)
+        parts = {"better": better, "worse": worse, "not told apart": alike, "of one seed, so not judged": unknown}
+        text = "; ".join(f"{name}: {', '.join(rows)}" for name, rows in parts.items() if rows)
+        lines.append(f"- {metric.upper()} of episodes with L* >= 5, against {reference}: {text}.")
+    return lines
+
+
+def _of_one_seed(row: Row, reference: str, summaries: Mapping[str, RowSummary]) -> bool:
+    """Tell whether an interval leaves out how much another training would differ."""
+    trained = [name for name in (row.name, reference) if not (name == row.name and row.agent in BASELINES)]
+    return min(len(summaries[name].seeds) for name in trained) == 1
+
+
+def _differences(compared: Sequence[Row], reference: str, summaries: Mapping[str, RowSummary]) -> list[str]:
     cells = []
-    for name in compared:
-        parts = summaries[name].differences[reference]
-        line = [name]
+    for row in compared:
+        parts = summaries[row.name].differences[reference]
+        line = [f"{row.name} {_ONE_SEED}" if _of_one_seed(row, reference, summaries) else row.name]
         for part in ("all", "long"):
-            line += [_interval(parts.get(part, {}).get(metric)) for metric in ("sr", "spl", "sae")]
+            line += [_interval(parts.get(part, {}).get(metric)) for metric in METRICS]
         cells.append(line)
-    return aligned(["row", "SR", "SPL", "SAE", "L>=5: SR", "SPL", "SAE"], cells)
+    return aligned(["row", *_METRICS], cells)
 
 
 def _kind(compared: Sequence[Row], reference: str, summaries: Mapping[str, RowSummary]) -> str:
     """Say what the intervals are of."""
-    own = len(summaries[reference].seeds)
-    trained = [row.name for row in compared if row.agent not in BASELINES]
-    single = [name for name in trained if min(own, len(summaries[name].seeds)) == 1]
     text = (
-        f"Percent points with {CONFIDENCE:.0%} intervals: {REPLICATES} bootstrap replicates over seeds (paired where "
-        "both rows have the same; stretched by Student's t, as they are few) and episodes (always paired)."
+        f"Row minus {reference} in percent points, with {CONFIDENCE:.0%} intervals: {REPLICATES} bootstrap replicates "
+        "over seeds, test rooms and episodes, always the same rooms and episodes for both. An interval without 0 says "
+        "that other trainings, tested in other rooms, would most likely differ in the same direction; few seeds make "
+        "it wide."
     )
-    if single:
-        text += f" Of one seed on either side, so hardly anything about another training: {', '.join(single)}."
+    if any(_of_one_seed(row, reference, summaries) for row in compared):
+        text += f" {_ONE_SEED} One seed, here or there: the interval leaves out how much another training would differ."
     return text
 
 

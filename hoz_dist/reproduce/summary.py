@@ -11,9 +11,6 @@ from hoz_dist.errors import InvalidValueError
 from hoz_dist.reproduce.bootstrap import Interval, Resampling
 from hoz_dist.reproduce.outcome import METRICS, Outcome
 
-PARTS = ("all", "long")
-"""Every episode, and those with L* >= 5."""
-
 
 @dataclass(frozen=True)
 class Spread:
@@ -37,7 +34,7 @@ class RowSummary:
     seeds: tuple[int, ...]
     trials: int
     episodes: Mapping[str, int]
-    """Number of episodes of a trial, by part."""
+    """Number of episodes of a trial, by part: all of them, and the long ones, which have L* >= 5."""
     spreads: Mapping[str, Mapping[str, Spread]]
     """By part and metric."""
     differences: Mapping[str, Mapping[str, Mapping[str, Interval]]]
@@ -97,7 +94,7 @@ def summarise(outcomes: Mapping[str, Mapping[int, Outcome]], references: Sequenc
                 raise InvalidValueError(message)
     masks = {"all": np.ones(len(first.optimal), dtype=np.bool_), "long": first.long}
     masks = {part: mask for part, mask in masks.items() if mask.any()}
-    draws = {part: Resampling(int(mask.sum())) for part, mask in masks.items()}
+    draws = {part: Resampling(first.room[mask], first.scene[mask]) for part, mask in masks.items()}
     summaries = {}
     for name, by_seed in present.items():
         values = {metric: _values(by_seed, metric) for metric in METRICS}

@@ -2,7 +2,12 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from hoz_dist.reproduce.bootstrap import Resampling
+from hoz_dist.reproduce.bootstrap import REPLICATES, Resampling
+
+
+def alone(episodes: int, replicates: int = REPLICATES) -> Resampling:
+    """Draws of episodes of which each has a room to itself, so that drawing rooms is drawing episodes."""
+    return Resampling(np.arange(episodes), np.zeros(episodes), replicates)
 
 
 def normal_width(deviation: float) -> float:
@@ -18,7 +23,7 @@ def student_width(of_seeds: np.ndarray) -> float:
 def test_with_one_seed_it_is_scipys_bootstrap_over_episodes() -> None:
     rng = np.random.default_rng(0)
     row, reference = rng.random(200) < 0.7, rng.random(200) < 0.5
-    interval = Resampling(200).interval(row[None].astype(float), reference[None].astype(float), same_seeds=True)
+    interval = alone(200).interval(row[None].astype(float), reference[None].astype(float), same_seeds=True)
     expected = stats.bootstrap(
         (row.astype(float) - reference.astype(float),), np.mean, n_resamples=4000, method="percentile", rng=1
     ).confidence_interval
@@ -29,17 +34,17 @@ def test_with_one_seed_it_is_scipys_bootstrap_over_episodes() -> None:
 
 def test_equal_rows_differ_by_nothing() -> None:
     values = np.random.default_rng(0).random((3, 100))
-    assert Resampling(100).interval(values, values, same_seeds=True) == (0.0, 0.0, 0.0)
+    assert alone(100).interval(values, values, same_seeds=True) == (0.0, 0.0, 0.0)
 
 
 def test_what_makes_episodes_hard_cancels_out() -> None:
     rng = np.random.default_rng(0)
     hardness = rng.random(400)
     row, reference = hardness + 0.1, hardness
-    interval = Resampling(400).interval(row[None], reference[None], same_seeds=True)
+    interval = alone(400).interval(row[None], reference[None], same_seeds=True)
     assert (interval.low, interval.high) == pytest.approx((0.1, 0.1), abs=1e-5)
     # Other seeds on either side: each row's own draw, but the same episodes.
-    unpaired = Resampling(400).interval(np.tile(row, (2, 1)), np.tile(reference, (3, 1)), same_seeds=False)
+    unpaired = alone(400).interval(np.tile(row, (2, 1)), np.tile(reference, (3, 1)), same_seeds=False)
     assert (unpaired.low, unpaired.high) == pytest.approx((0.1, 0.1), abs=1e-5)
 
 
@@ -47,22 +52,22 @@ def test_seeds_that_differ_widen_the_interval_as_they_should() -> None:
     # Episodes are all alike, so that seeds are all that is uncertain.
     of_seeds = np.array([0.2, 0.4, 0.5, 0.6, 0.8])
     row, reference = np.tile(of_seeds[:, None], (1, 50)), np.full((5, 50), 0.3)
-    interval = Resampling(50).interval(row, reference, same_seeds=False)
+    interval = alone(50).interval(row, reference, same_seeds=False)
     assert interval.high - interval.low == pytest.approx(student_width(of_seeds), rel=0.1)
 
 
 def test_pairs_of_seeds_cancel_and_others_do_not() -> None:
     of_seeds = np.linspace(0.2, 0.8, 5)
     row, reference = np.tile(of_seeds[:, None] + 0.1, (1, 50)), np.tile(of_seeds[:, None], (1, 50))
-    paired = Resampling(50).interval(row, reference, same_seeds=True)
+    paired = alone(50).interval(row, reference, same_seeds=True)
     assert (paired.low, paired.high) == pytest.approx((0.1, 0.1), abs=1e-5)
-    unpaired = Resampling(50).interval(row, reference, same_seeds=False)
+    unpaired = alone(50).interval(row, reference, same_seeds=False)
     assert unpaired.high - unpaired.low == pytest.approx(student_width(of_seeds) * 2**0.5, rel=0.15)
 
 
 @pytest.mark.parametrize("seeds", [3, 5])
 def test_a_few_seeds_are_not_taken_for_many(seeds: int) -> None:
-    rng, draws, held = np.random.default_rng(5), Resampling(20, replicates=1000), 0
+    rng, draws, held = np.random.default_rng(5), alone(20, replicates=1000), 0
     for _ in range(400):
         row, reference = np.repeat(rng.standard_normal((2, seeds, 1)), 20, axis=2)
         interval = draws.interval(row, reference, same_seeds=True)
@@ -72,7 +77,7 @@ def test_a_few_seeds_are_not_taken_for_many(seeds: int) -> None:
 
 def test_intervals_of_chance_hold_the_truth_as_often_as_they_say() -> None:
     rng = np.random.default_rng(3)
-    draws, held = Resampling(150, replicates=400), 0
+    draws, held = alone(150, replicates=400), 0
     for _ in range(200):
         hardness, suits = rng.random(150), 0.5 * rng.standard_normal(150)
         of_row, of_reference = 0.1 * rng.standard_normal((2, 8, 1))
@@ -81,16 +86,34 @@ def test_intervals_of_chance_hold_the_truth_as_often_as_they_say() -> None:
     assert 0.88 <= held / 200 <= 0.99
 
 
-def test_noise_of_single_cells_makes_intervals_too_wide_rather_than_too_narrow() -> None:
-    rng, draws = np.random.default_rng(3), Resampling(150, replicates=400)
-    rows = (rng.random((100, 2, 8, 150)) < 0.5).astype(float)
+@pytest.mark.parametrize("seeds", [1, 2, 3, 5])
+def test_noise_of_single_cells_makes_intervals_too_wide_rather_than_too_narrow(seeds: int) -> None:
+    rng, draws = np.random.default_rng(3), alone(150, replicates=400)
+    rows = (rng.random((100, 2, seeds, 150)) < 0.5).astype(float)
     intervals = [draws.interval(*pair, same_seeds=True) for pair in rows]
     deviation = float(np.std([interval.difference for interval in intervals]))
     widths = [interval.high - interval.low for interval in intervals]
-    assert normal_width(deviation) < np.mean(widths) < 2.5 * normal_width(deviation)
+    widest = {1: 1.2, 2: 7.0, 3: 2.5, 5: 2.0}[seeds]
+    assert 0.9 * normal_width(deviation) < np.mean(widths) < widest * normal_width(deviation)
+
+
+@pytest.mark.parametrize(("scenes", "rooms"), [(4, 5), (1, 10)])
+@pytest.mark.parametrize("seeds", [1, 5])
+def test_rooms_that_suit_one_row_are_not_taken_for_all_rooms(scenes: int, rooms: int, seeds: int) -> None:
+    room = np.arange(600) % (scenes * rooms)
+    scene = room // rooms
+    rng, draws, plain, held = np.random.default_rng(7), Resampling(room, scene, 400), alone(600, 400), [0, 0]
+    for _ in range(200):
+        suits = 0.05 * rng.standard_normal(scenes * rooms)[room]
+        row = suits + 0.2 * rng.standard_normal(600) + 0.1 * rng.standard_normal((seeds, 600))
+        for number, one in enumerate((draws, plain)):
+            interval = one.interval(row, np.zeros((seeds, 600)), same_seeds=True)
+            held[number] += interval.low <= 0.0 <= interval.high
+    assert held[0] / 200 >= 0.89
+    assert held[1] / 200 <= 0.85
 
 
 def test_the_same_data_give_the_same_interval() -> None:
     values = np.random.default_rng(0).random((2, 3, 60))
-    first, again = (Resampling(60).interval(*values, same_seeds=True) for _ in range(2))
+    first, again = (alone(60).interval(*values, same_seeds=True) for _ in range(2))
     assert first == again

@@ -8,7 +8,7 @@ from hoz_dist.errors import HozError
 from hoz_dist.reproduce.markdown import aligned, table_text
 from hoz_dist.reproduce.outcome import Outcome
 from hoz_dist.reproduce.plot import table_figure
-from hoz_dist.reproduce.row import Figures, Paper
+from hoz_dist.reproduce.row import Figures, Paper, Row
 from hoz_dist.reproduce.summary import summarise
 from hoz_dist.viz.zones import png
 from tests.unit.reproduce.making import TABLE, TINY, make_outcome
@@ -60,7 +60,7 @@ def test_episodes_that_are_all_short_have_no_long_part() -> None:
     short = replace(short, optimal=np.minimum(short.optimal, 4))
     summaries = summarise({"hoz": {0: short}}, ["hoz"])
     assert list(summaries["hoz"].spreads) == ["all"]
-    assert table_text(TABLE, TINY, summaries, "command", {}).endswith("|        - |   - |   - |\n")
+    assert table_text(TABLE, TINY, summaries, "command", {}).endswith("|        - |         - |         - |\n")
     assert png(table_figure(TABLE, summaries)).startswith(b"\x89PNG")
 
 
@@ -76,7 +76,7 @@ def test_markdown_has_rows_intervals_and_the_papers_figures(outcomes: dict[str, 
     assert f"{summaries['random'].spreads['all']['sr'].mean:.1f} ±" in row
     interval = summaries["object"].differences["hoz"]["all"]["sr"]
     assert f"{interval.difference:+.1f} [{interval.low:+.1f}, {interval.high:+.1f}]" in text
-    assert "hardly anything" not in text  # of random, which is not trained, one seed is all
+    assert "†" not in text  # of random, which is not trained, one seed is all
     assert "Unfinished" not in text
     assert "over the 2 rows other than the reference" in text
     assert "other order" not in text
@@ -87,7 +87,33 @@ def test_markdown_has_rows_intervals_and_the_papers_figures(outcomes: dict[str, 
 def test_comparisons_of_one_training_are_told(outcomes: dict[str, dict[int, Outcome]]) -> None:
     del outcomes["object"][1]
     text = table_text(TABLE, TINY, summarise(outcomes, TABLE.references), "command", {})
-    assert "hardly anything about another training: object." in text
+    assert "- SR of episodes with L* >= 5, against hoz: worse: random; of one seed, so not judged: object." in text
+    assert "| object † |" in text
+    assert "† One seed" in text
+
+
+def test_rows_are_judged_by_their_intervals() -> None:
+    skills, references = {"random": 0.1, "object": 0.5, "hoz": 0.9}, ("hoz", "object")
+    outcomes = {
+        name: {seed: make_outcome(10 * number + seed, skill=skill) for seed in range(5)}
+        for number, (name, skill) in enumerate(skills.items())
+    }
+    outcomes["same"] = outcomes["object"]
+    table = replace(TABLE, rows=(*TABLE.rows, Row(name="same", agent="object")), references=references)
+    text = table_text(table, TINY, summarise(outcomes, references), "command", {})
+    assert "- SR of episodes with L* >= 5, against object: better: hoz; worse: random; not told apart: same." in text
+
+
+def test_pairs_of_seeds_are_compared_pair_by_pair(outcomes: dict[str, dict[int, Outcome]]) -> None:
+    # The second row has the first one's results but for what both lose with a bad seed.
+    skills = (0.3, 0.6, 0.9)
+    both = {seed: make_outcome(seed, skill=skill) for seed, skill in enumerate(skills)}
+    paired = summarise({"hoz": both, "object": dict(both)}, ["hoz"])["object"].differences["hoz"]["all"]["sr"]
+    assert (paired.low, paired.high) == (0.0, 0.0)
+    others = {seed + 1: outcome for seed, outcome in both.items()}
+    apart = summarise({"hoz": both, "object": others}, ["hoz"])["object"].differences["hoz"]["all"]["sr"]
+    assert apart.low < -10
+    assert apart.high > 10
 
 
 def test_an_unfinished_table_says_what_it_lacks(outcomes: dict[str, dict[int, Outcome]]) -> None:
