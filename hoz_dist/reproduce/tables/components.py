@@ -21,7 +21,9 @@ COMPONENTS: Final = Table(
         WITHOUT_ZONE,
         Row(name="hoz without scene", agent="hoz", options={"without": ("scene",)}),
         Row(name="hoz without object", agent="hoz", options={"without": ("object",)}),
+        Row(name="hoz without object and zone", agent="hoz", options={"without": ("object", "zone")}),
         HOZ,
     ),
-    note="The rows are ours: the paper's were not at hand. Without the scene layer, hoz is told the true scene.",
+    note="The rows are ours: the paper's were not at hand. Without the scene layer, hoz is told the true scene. The last "
+    "two without: what zones give to a policy that sees no boxes itself.",
 )
