@@ -204,7 +204,7 @@ def run_tasks(tasks: Sequence[Task], place: Place, jobs: int, costs: Costs) -> N
                 share = max(0.0, 1.0 - left / expected)
                 if share > _SETTLED:
                     left *= (time.monotonic() - began) / (share * expected)
-                note = "  ".join([f"{done} of {len(tasks)} runs", *(one.text for one in running)])
+                note = "  ".join([f"{done} of {len(tasks)} agents", *(one.text for one in running)])
                 progress.update(min(share, 0.999) if running or waiting else 1.0, note, left=left)
         finally:
             for one in running:

@@ -13,6 +13,7 @@ from hoz_dist.cli.reproduce_task import Report
 from hoz_dist.errors import HozError, OwnMistakeError
 from hoz_dist.reproduce.costs import Speed
 from hoz_dist.reproduce.job import jobs_of, tasks_of
+from tests.unit.cli.workers import Worked
 from tests.unit.reproduce.making import TABLE, TINY
 
 
@@ -27,24 +28,6 @@ def test_a_full_disk_is_no_mistake_of_ours() -> None:
     (report,) = worker.receive()
     worker.join()
     assert report == Report("failed", note="'somewhere': No space left on device.")
-
-
-class Worked:
-    """A worker that has ended, and what it sent: each list when it is asked once more."""
-
-    def __init__(self, status: int, *sent: list[Any]) -> None:
-        self.connection = object()
-        self.exit_status = status
-        self._sent = iter(sent)
-
-    def receive(self) -> list[Any]:
-        return next(self._sent, [])
-
-    def terminate(self) -> None:
-        pass
-
-    def join(self) -> None:
-        pass
 
 
 @pytest.mark.parametrize(
