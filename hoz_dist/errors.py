@@ -10,6 +10,8 @@ Every message is one sentence that says what is wrong and what to do. The comman
     ├── NotFoundError         a file, run or graph that is not there (yet)
     ├── RunMismatchError      a run folder that belongs to another configuration
     └── ConnectionFailedError no router, no learner, or no answer at an endpoint
+
+Apart from these stands OwnMistakeError, which no user can mend; the status is then 1.
 """
 
 from collections.abc import Iterable
@@ -56,3 +58,7 @@ class RunMismatchError(HozError):
 
 class ConnectionFailedError(HozError):
     """No router, no learner, or no answer at an endpoint."""
+
+
+class OwnMistakeError(Exception):
+    """A process of ours failed as none should; what it wrote tells us more."""

@@ -1,13 +1,15 @@
 """`hoz-dist analyse`: why episodes of runs fail, where SPL is lost, and what the graph did."""
 
 import json
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from hoz_dist.cli.options import cache_option, trial_options, weights_option
+from hoz_dist.errors import InvalidValueError
 
 if TYPE_CHECKING:
     from hoz_dist.cli.trace_runs import TracedRuns
@@ -20,7 +22,9 @@ if TYPE_CHECKING:
 @trial_options(trials=1)
 @click.option("--long", "only_long", is_flag=True, help="Show the episodes with L* >= 5 alone in the table.")
 @click.option(
-    "--curve", is_flag=True, help="Also measure each checkpoint that a run folder keeps, for frames to SR 50 and 70."
+    "--curve",
+    is_flag=True,
+    help="Also measure each checkpoint that a run folder keeps, for frames to SR 50 and 70; in validation rooms only.",
 )
 @click.option("--out", type=click.Path(file_okay=False, path_type=Path), help="Folder for pictures and analysis.json.")
 @weights_option
@@ -43,9 +47,14 @@ def analyse_command(
 ) -> None:
     """Say why episodes of each RUN fail, where SPL is lost, and what the graph did.
 
-    RUN is a run folder or a checkpoint file. Runs that differ by their seed alone count as one method. All of them, and
-    Random and Oracle beside them, run the same fixed episodes. docs/analysis.md explains each figure.
+    RUN is a checkpoint file, or a run folder for its newest checkpoint; `reproduce` tests another one, which
+    seed-N.choice-*.json beside the folder names. Runs that differ by their seed alone count as one method. All of them
+    run the same fixed episodes at temperature 0.5, with Random and Oracle beside them. docs/analysis.md explains each
+    figure.
     """
+    if curve and split == "test":
+        message = "--curve compares checkpoints, which is for validation rooms; leave out --curve or --split test."
+        raise InvalidValueError(message)
     from hoz_dist.cli.consoles import result_console
     from hoz_dist.cli.trace_runs import open_runs, trace_runs
     from hoz_dist.evaluation.analysis_table import analysis_table
@@ -61,20 +70,28 @@ def analyse_command(
     )
     traced = trace_runs(opened, range(seed, seed + trials))
     results = _results(traced, split)
+    rooms = f"{'validation' if split == 'val' else 'test'} rooms"
     if out is not None:
-        _draw(traced, out, results)
+        _draw(traced, out, results, rooms)
     if as_json:
         click.echo(json.dumps(results, indent=2))
         return
     shown = [analysis.long if only_long else analysis for analysis in traced.analyses]
+    seeds = f"seed {seed}" if trials == 1 else f"seeds {seed} to {seed + trials - 1}"
     table = analysis_table(
         [analysis for analysis in shown if analysis is not None],
         traced.curves,
-        title=f"{len(traced.benchmark.episodes)} episodes on unseen {'validation' if split == 'val' else 'test'} rooms"
-        + (", those with L* >= 5" if only_long else ""),
+        title=f"{len(traced.benchmark.episodes)} episodes on unseen {rooms}"
+        + (", those with L* >= 5" if only_long else "")
+        + f"; runs: {_counts(run.method for run in opened)}; trials of each: {trials} ({seeds})",
         caption="docs/analysis.md explains each figure",
     )
     result_console().print(table)
+
+
+def _counts(methods: Iterable[str]) -> str:
+    """Say how many runs each method has."""
+    return ", ".join(f"{name} {runs}" for name, runs in Counter(methods).items())
 
 
 def _results(traced: "TracedRuns", split: str) -> dict[str, Any]:
@@ -95,14 +112,15 @@ def _curve(curve: "LearningCurve") -> dict[str, Any]:
     return {**curve._asdict(), "frames_to": {f"{rate:.0f}": frames_to(curve, rate) for rate in MILESTONES}}
 
 
-def _draw(traced: "TracedRuns", folder: Path, results: Mapping[str, Any]) -> None:
+def _draw(traced: "TracedRuns", folder: Path, results: Mapping[str, Any], rooms: str) -> None:
     from hoz_dist.atomic import replace_file, write_atomically
     from hoz_dist.viz.analysis import failure_figure, learning_figure, length_figure
     from hoz_dist.viz.trajectory import draw_trajectories
     from hoz_dist.viz.zones import png
 
     folder.mkdir(parents=True, exist_ok=True)
-    figures = {"failures": failure_figure(traced.methods), "success-by-length": length_figure(traced.methods)}
+    methods = traced.methods
+    figures = {"failures": failure_figure(methods, rooms), "success-by-length": length_figure(methods, rooms)}
     if traced.curves:
         figures["learning-curves"] = learning_figure(traced.curves)
     for name, figure in figures.items():

@@ -12,10 +12,11 @@ from typing import Final, NamedTuple
 import click
 
 from hoz_dist import __version__
-from hoz_dist.errors import HozError, UnknownNameError
+from hoz_dist.errors import HozError, OwnMistakeError, UnknownNameError
 
 EXIT_FAILED: Final = 1
-"""The exit status of a command that did its work and found something wrong, or that could not print its result."""
+"""The exit status of a command that did its work and found something wrong, that could not print its result, or that
+failed by a mistake of ours."""
 EXIT_USER_ERROR: Final = 2
 """The exit status of an error that is the user's to mend; click's own for wrong usage."""
 EXIT_INTERRUPTED: Final = 130
@@ -98,9 +99,9 @@ def cli() -> None:
 def main() -> None:
     """Run the command line and exit.
 
-    Exit status: 0 on success, 1 when a check found something wrong, 2 for an error of the user's, said in one sentence
-    on standard error, 130 when interrupted, by SIGTERM too: it ends a command as Ctrl-C does, by way of the `with`
-    statements that stop its children.
+    Exit status: 0 on success, 1 when a check found something wrong or for a mistake of ours, 2 for an error of the
+    user's, said in one sentence on standard error, 130 when interrupted, by SIGTERM too: it ends a command as Ctrl-C
+    does, by way of the `with` statements that stop its children.
     """
     # SIGINT too: a shell script starts background commands with it ignored, and Python leaves it so.
     for number in (signal.SIGINT, signal.SIGTERM):
@@ -132,6 +133,9 @@ def run(arguments: list[str]) -> int:
     except (click.ClickException, HozError, OSError) as error:
         click.echo(f"hoz-dist: {sentence_of(error)}", err=True)
         return EXIT_USER_ERROR
+    except OwnMistakeError as error:
+        click.echo(f"hoz-dist: {error}", err=True)
+        return EXIT_FAILED
     return result if isinstance(result, int) else 0
 
 

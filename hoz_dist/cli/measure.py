@@ -1,4 +1,7 @@
-"""Measures a checkpoint and shows the progress: what `hoz-dist evaluate` and the end of `hoz-dist train` share."""
+"""From a checkpoint to its agent, its rooms and what it reaches, with the progress shown.
+
+`hoz-dist evaluate`, `analyse`, `reproduce` and the end of `train` share it.
+"""
 
 import os
 from collections.abc import Sequence

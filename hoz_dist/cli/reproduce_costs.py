@@ -12,7 +12,7 @@ from typing import Any, Final
 from hoz_dist.cli.progress import Progress
 from hoz_dist.cli.rendering import Encoding, render_rooms
 from hoz_dist.cli.reproduce_crew import OUR_MISTAKE, Worker
-from hoz_dist.errors import HozError
+from hoz_dist.errors import HozError, OwnMistakeError
 from hoz_dist.nav.rooms import RoomId, training_rooms
 from hoz_dist.policy.encoders import load_encoder
 from hoz_dist.reproduce.costs import Costs, Speed
@@ -59,6 +59,7 @@ def measure_costs(tasks: Sequence[Task], cache: Path, picture_size: int, jobs: i
 
     Raises:
         HozError: The cache cannot be written, or a process failed.
+        OwnMistakeError: A process failed without a reason.
     """
     trainings = {task.training.digest: task for task in tasks if task.training is not None}
     samples = [room for task in trainings.values() if task.training for room in sample_rooms(task.training.scenes)]
@@ -83,17 +84,20 @@ def _speeds(trainings: Mapping[str, Task], cache: Path, jobs: int) -> dict[str, 
     measured: dict[Worker, list[Speed]] = {worker: [] for worker in workers}
     try:
         with Progress("Measuring", len(wanted) * jobs, "measurements") as progress:
-            while any(len(speeds) < len(wanted) for speeds in measured.values()):
-                wait([worker.connection for worker in workers], _POLL_S)
-                for worker, speeds in measured.items():
+            # Those alone that owe something: the connection of one that has ended is always ready.
+            while owing := [worker for worker, speeds in measured.items() if len(speeds) < len(wanted)]:
+                wait([worker.connection for worker in owing], _POLL_S)
+                for worker in owing:
                     status = worker.exit_status
-                    for message in worker.receive():
-                        if not isinstance(message, Speed):
-                            raise HozError(message.note)
-                        speeds.append(message)
-                    if status and len(speeds) < len(wanted):
-                        killed = "A process that measures was killed, perhaps for want of memory; use fewer --jobs."
-                        raise HozError(killed if status < 0 else OUR_MISTAKE)
+                    for sent in worker.receive():
+                        if not isinstance(sent, Speed):
+                            raise HozError(sent.note)
+                        measured[worker].append(sent)
+                    if status and len(measured[worker]) < len(wanted):
+                        if status > 0:
+                            raise OwnMistakeError(OUR_MISTAKE)
+                        message = "A process that measures was killed, perhaps for want of memory; use fewer --jobs."
+                        raise HozError(message)
                 progress.update(sum(map(len, measured.values())))
     finally:
         for worker in workers:

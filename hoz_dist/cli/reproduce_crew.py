@@ -17,7 +17,7 @@ from hoz_dist.cli.main import sentence_of
 from hoz_dist.cli.processes import MOST_RESTARTS, STOP_S
 from hoz_dist.cli.progress import Progress
 from hoz_dist.cli.reproduce_task import Place, Report, frames_of, perform
-from hoz_dist.errors import HozError
+from hoz_dist.errors import HozError, OwnMistakeError
 from hoz_dist.reproduce.costs import Costs, makespan
 from hoz_dist.reproduce.job import Task
 
@@ -117,6 +117,7 @@ class _Assignment:
 
         Raises:
             HozError: It failed, or was killed too often.
+            OwnMistakeError: It failed without a reason.
         """
         status = self.worker.exit_status  # first: what it sent before its end is then there to be received
         for report in self.worker.receive():
@@ -129,7 +130,7 @@ class _Assignment:
         if status == 0:
             return True
         if status > 0:
-            raise HozError(OUR_MISTAKE)
+            raise OwnMistakeError(OUR_MISTAKE)
         if self._restarts >= MOST_RESTARTS:
             message = (
                 "A process of this command was killed again and again, perhaps for want of memory; use fewer --jobs."
@@ -184,6 +185,7 @@ def run_tasks(tasks: Sequence[Task], place: Place, jobs: int, costs: Costs) -> N
 
     Raises:
         HozError: A task failed; what is finished is kept.
+        OwnMistakeError: A process failed without a reason.
     """
     context = multiprocessing.get_context("spawn")
     waiting, running = deque(tasks), list[_Assignment]()
@@ -202,7 +204,7 @@ def run_tasks(tasks: Sequence[Task], place: Place, jobs: int, costs: Costs) -> N
                 share = max(0.0, 1.0 - left / expected)
                 if share > _SETTLED:
                     left *= (time.monotonic() - began) / (share * expected)
-                note = "  ".join([f"{done} of {len(tasks)} runs", *(one.text for one in running)])
+                note = "  ".join([f"{done} of {len(tasks)} agents", *(one.text for one in running)])
                 progress.update(min(share, 0.999) if running or waiting else 1.0, note, left=left)
         finally:
             for one in running:

@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from hoz_dist.atomic import replace_file, write_atomically
+from hoz_dist.atomic import write_atomically
 from hoz_dist.reproduce.budget import Budget
 from hoz_dist.reproduce.job import Job
 from hoz_dist.reproduce.markdown import table_text
@@ -75,15 +75,15 @@ class Results:
     @property
     def hours(self) -> float:
         """Hours of one run after the other: training, choosing and testing."""
-        seconds: dict[str, float] = {}
-        for of_row in self.outcomes.values():
-            for outcome in of_row.values():
-                facts = outcome.facts
-                choice = facts.get("choice", {})
-                # Tests of one training count it once: its choice holds times that no other has.
-                run = json.dumps(choice) if choice else facts["agent"]
-                seconds[run] = facts.get("training_seconds", 0.0) + choice.get("seconds", 0.0)
-                seconds[f"test {run} {facts.get('tested_with')}"] = facts["test_seconds"]
+        seconds: dict[Path, float] = {}
+        for name, of_row in self.jobs.items():
+            for job in of_row:
+                if job.seed not in self.outcomes[name]:
+                    continue
+                facts = self.outcomes[name][job.seed].facts
+                if job.training is not None:  # which other tests may share
+                    seconds[job.training.folder(Path())] = facts["training_seconds"] + facts["choice"]["seconds"]
+                seconds[job.result(Path())] = facts["test_seconds"]
         return sum(seconds.values()) / 3600.0
 
     def text(self) -> str:
@@ -92,7 +92,10 @@ class Results:
         if not self.summaries:
             return text
         folders = ", ".join(f"{name} `{self.jobs[name][0].result(Path()).parent}`" for name in self.summaries)
-        return f"{text}\n{self.hours:.1f} hours of runs in all. Every episode of each row, under `--out`: {folders}.\n"
+        return (
+            f"{text}\n{self.hours:.1f} hours of runs in all. Every episode of each row, in the folder that the command "
+            f"worked in (`--out`): {folders}.\n"
+        )
 
     def to_json(self) -> dict[str, Any]:
         """Return everything but the results of episodes, for which each run names its file in the folder."""
@@ -145,18 +148,3 @@ class Results:
             paths.append(folder / f"{self.stem}.png")
             write_atomically(paths[2], png(table_figure(self.table, self.summaries)), overwrite=True)
         return paths
-
-
-def read_sessions(path: Path) -> list[dict[str, Any]]:
-    """Return what was noted of earlier starts; nothing when the file is not there or damaged: no result hangs on it."""
-    try:
-        sessions = json.loads(path.read_text("utf-8"))
-    except (FileNotFoundError, ValueError):
-        return []
-    return [one for one in sessions if isinstance(one, dict) and "table" in one] if isinstance(sessions, list) else []
-
-
-def note_session(path: Path, sessions: Sequence[Mapping[str, Any]]) -> None:
-    """Note the starts of the command, this one last."""
-    text = json.dumps(list(sessions), indent=2) + "\n"
-    replace_file(path, lambda temporary: temporary.write_text(text, "utf-8"))

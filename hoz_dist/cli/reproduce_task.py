@@ -9,6 +9,7 @@ import os
 import threading
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -126,7 +127,9 @@ def _choose(job: Job, training: Training, place: Place, tell: Tell) -> "tuple[Ch
     file, run = job.choice(place.out), training.folder(place.out)
     if file.exists():
         choice = _read_json(file)
-        return load_checkpoint(run / FOLDER / choice["checkpoint"]), choice
+        # Chosen anew when it is gone: somebody deleted the run, and it was trained again.
+        with suppress(NotFoundError):
+            return load_checkpoint(run / FOLDER / choice["checkpoint"]), choice
     protocol, began = job.protocol, time.monotonic()
     benchmark = _benchmark(
         place, training.config.picture_size, protocol.rooms("val"), "val", protocol.validation_episodes

@@ -47,13 +47,18 @@ def frames_to(curve: LearningCurve, success: float) -> float | None:
     return None
 
 
-def mean_curve(curves: Sequence[LearningCurve]) -> MeanCurve:
+def mean_curve(curves: Sequence[LearningCurve]) -> MeanCurve | None:
     """Put runs together at the checkpoints of the first, as far as all of them go.
 
     Args:
         curves: At least one, each with at least one checkpoint.
+
+    Returns:
+        The mean; None when one run ends before another begins.
     """
     begin, end = max(curve.frames[0] for curve in curves), min(curve.frames[-1] for curve in curves)
+    if begin > end:
+        return None
     # Runs stop a few frames apart; without its ends the range could be empty.
     grid = np.unique([begin, end, *(frames for frames in curves[0].frames if begin <= frames <= end)])
     rates = np.stack([np.interp(grid, curve.frames, curve.success) for curve in curves])

@@ -60,7 +60,8 @@ class Outcome:
         known = (self.room.min() >= 0 and self.room.max() < len(self.rooms)) and (
             self.target.min() >= 0 and self.target.max() < len(TARGETS)
         )
-        if not known or self.optimal.min() < 1 or (self.moves < 0).any() or (self.moves > self.actions).any():
+        counts = (self.actions < 1) | (self.moves < 0) | (self.moves > self.actions)
+        if not known or self.optimal.min() < 1 or counts.any():
             message = "values out of range"
             raise ValueError(message)
 

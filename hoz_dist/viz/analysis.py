@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Final
 
+import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
@@ -25,10 +26,15 @@ _SIDESTEP: Final = 0.08
 """Between methods in one bin, so that their intervals do not hide each other."""
 
 
-def failure_figure(analyses: Sequence[Analysis]) -> Figure:
-    """Draw the share of episodes that failed, a bar for each method, stacked by cause."""
+def failure_figure(analyses: Sequence[Analysis], rooms: str) -> Figure:
+    """Draw the share of episodes that failed, a bar for each method, stacked by cause.
+
+    Args:
+        analyses: The methods.
+        rooms: What the rooms are called, for the title.
+    """
     figure = Figure(figsize=(4.4 + 0.9 * len(analyses), 4.6), layout="constrained")
-    axes = figure.add_subplot(ylabel="failed episodes", title="Why episodes fail")
+    axes = figure.add_subplot(ylabel="failed episodes", title=f"Why episodes fail, {rooms}")
     names = [analysis.name for analysis in analyses]
     shares = [causes(analysis) for analysis in analyses]
     bottom = [0.0] * len(names)
@@ -44,10 +50,16 @@ def failure_figure(analyses: Sequence[Analysis]) -> Figure:
     return figure
 
 
-def length_figure(analyses: Sequence[Analysis]) -> Figure:
-    """Draw success against the length of the optimal path, with 95% intervals."""
+def length_figure(analyses: Sequence[Analysis], rooms: str) -> Figure:
+    """Draw success against the length of the optimal path, with 95% intervals.
+
+    Args:
+        analyses: The methods.
+        rooms: What the rooms are called, for the title.
+    """
     figure = Figure(figsize=(7.0, 4.6), layout="constrained")
-    axes = figure.add_subplot(xlabel="L*, actions (episodes)", ylabel="success", title="Success against optimal path")
+    title = f"Success against optimal path, {rooms}"
+    axes = figure.add_subplot(xlabel="L*, actions (episodes)", ylabel="success", title=title)
     for number, analysis in enumerate(analyses):
         bins = success_by_length(analysis.trials)
         places = [index + _SIDESTEP * (number - (len(analyses) - 1) / 2) for index in range(len(bins))]
@@ -67,6 +79,8 @@ def length_figure(analyses: Sequence[Analysis]) -> Figure:
 def learning_figure(curves: Mapping[str, Sequence[LearningCurve]]) -> Figure:
     """Draw success on validation rooms against frames: the mean over a method's runs, and their range.
 
+    Runs that have no frames in common are drawn one by one.
+
     Args:
         curves: Curves of each run of a method, by its name; at least one.
     """
@@ -74,9 +88,14 @@ def learning_figure(curves: Mapping[str, Sequence[LearningCurve]]) -> Figure:
     axes = figure.add_subplot(xlabel="frames, millions", ylabel="success on validation rooms", title="Learning")
     for number, (name, of_runs) in enumerate(curves.items()):
         mean = mean_curve(of_runs)
+        marker = _MARKERS[number % len(_MARKERS)]
+        if mean is None:
+            for run, curve in enumerate(of_runs, start=1):
+                frames = np.array(curve.frames) / 1e6
+                axes.plot(frames, curve.success, marker=marker, markersize=4, label=f"{name} (run {run})")
+            continue
         frames = mean.frames / 1e6
         runs = "" if len(of_runs) == 1 else f" ({len(of_runs)} runs)"
-        marker = _MARKERS[number % len(_MARKERS)]
         (line,) = axes.plot(frames, mean.mean, marker=marker, markersize=4, label=f"{name}{runs}")
         axes.fill_between(frames, mean.low, mean.high, color=line.get_color(), alpha=0.2, linewidth=0)
     axes.set_ylim(0, 100)

@@ -61,9 +61,12 @@ def test_methods_are_analysed_side_by_side_and_drawn(
 
 
 def test_the_same_figures_as_a_table(runs: Path, cache: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run([*words_for(cache, runs / "object-0"), "--long"]) == 0
+    assert run([*words_for(cache, runs / "object-0"), "--long", "--trials", "2"]) == 0
     out = capsys.readouterr().out
-    assert "validation rooms, those with L* >= 5" in out
+    title = " ".join(out.split("\u250f")[0].split())  # up to the table's first corner
+    assert title == (
+        "12 episodes on unseen validation rooms, those with L* >= 5; runs: object 1; trials of each: 2 (seeds 0 to 1)"
+    )
     assert "wrong Done: not in view" in out
     assert "L* 1-4" not in out
 
@@ -76,6 +79,7 @@ def test_a_users_mistake_is_one_sentence(
         ([*words_for(cache, unkept), "--curve"], f"'{unkept}' keeps no checkpoint for a curve; give a run folder"),
         (words_for(cache, runs / "none"), "There is no checkpoint"),
         (["analyse"], "Missing argument 'RUN...'."),
+        ([*words_for(cache, runs / "object-0"), "--curve", "--split", "test"], "--curve compares checkpoints, which"),
     ):
         assert run(words) == 2
         out, err = capfd.readouterr()

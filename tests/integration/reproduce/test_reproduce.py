@@ -17,7 +17,9 @@ from hoz_dist.wire.transport.environment import child_environment
 from tests.integration.reproduce.tables import FEW_ROOMS, TINY_BUDGET, TINY_TABLE
 from tests.waiting import until
 
-pytestmark = pytest.mark.integration
+STEP_S = 240.0
+"""How long a start of the command may take, rendering on a machine that is busy with other work included, seconds."""
+pytestmark = [pytest.mark.integration, pytest.mark.timeout(3 * STEP_S)]
 
 
 def words_for(out: Path, cache: Path) -> list[str]:
@@ -39,13 +41,13 @@ def test_a_killed_command_goes_on_and_makes_the_table(
 ) -> None:
     out = tmp_path / "out"
     with start(out, cache) as killed:
-        until(lambda: any(out.glob("runs/hoz-*/seed-0/checkpoints/*.keep")), "a checkpoint")
+        until(lambda: any(out.glob("runs/hoz-*/seed-0/checkpoints/*.keep")), "a checkpoint", STEP_S)
         killed.send_signal(signal.SIGKILL)
 
     with start(out, cache, "--json") as again:
-        printed, told = again.communicate(timeout=90)
+        printed, told = again.communicate(timeout=STEP_S)
     assert again.returncode == 0, told
-    assert "1 runs, 1 at once, take about" in told
+    assert "Agents left: 1, of which 1 learn; with 1 at once it takes about" in told
 
     # The run went on where it was.
     (folder,) = out.glob("runs/hoz-*/seed-0")
@@ -62,7 +64,8 @@ def test_a_killed_command_goes_on_and_makes_the_table(
     assert "| order 1 |" in (out / "tiny-tiny.md").read_text()
     assert (out / "tiny-tiny.png").read_bytes().startswith(b"\x89PNG")
     sessions = json.loads((out / "tiny-tiny.json").read_text())["sessions"]
-    assert [session["took_seconds"] is None for session in sessions] == [True, False]
+    assert [session["finished"] for session in sessions] == [False, True]
+    assert all(session["took_seconds"] >= 0.0 for session in sessions)
 
     # What is finished is not done again, the test rooms least of all.
     kept = {path: path.stat().st_mtime_ns for path in out.glob("results/*/*.json")}

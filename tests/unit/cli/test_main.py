@@ -10,6 +10,7 @@ import pytest
 
 from hoz_dist import __version__
 from hoz_dist.cli.main import COMMANDS, cli, run
+from hoz_dist.errors import OwnMistakeError
 
 HEAVY = {"torch", "numpy", "scipy", "sklearn", "pybullet", "gymnasium", "zenoh", "matplotlib", "rich", "msgpack"}
 
@@ -107,6 +108,7 @@ def test_a_bare_command_shows_its_help(capsys: pytest.CaptureFixture[str]) -> No
         ),
         (OSError(28, "No space left on device"), 2, "hoz-dist: The system refuses: No space left on device.\n"),
         (OSError("cannot write it"), 2, "hoz-dist: The system refuses: cannot write it.\n"),
+        (OwnMistakeError("That was us."), 1, "hoz-dist: That was us.\n"),
     ],
 )
 def test_interruption_and_files_that_cannot_be_used(

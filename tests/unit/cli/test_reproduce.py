@@ -1,19 +1,27 @@
 import json
+import shutil
 from pathlib import Path
+from typing import Any
 
 import pytest
+from filelock import FileLock
 
 from hoz_dist.cli.main import EXIT_USER_ERROR, run
 from hoz_dist.cli.reproduce_results import Results
 from hoz_dist.reproduce.job import jobs_of
+from hoz_dist.reproduce.outcome import METRICS
 from hoz_dist.reproduce.tables import TABLES
 from tests.unit.reproduce.making import TABLE, TINY, make_outcome
+
+DOCS = Path(__file__).parents[3] / "docs" / "results"
 
 
 def test_without_a_table_all_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["reproduce"]) == 0
     said = capsys.readouterr().out
     assert all(name in said for name in TABLES)
+    assert "10 rows, 11 trainings of 2M frames" in said  # of eight agents, three of them with two seeds
+    assert "21 rows, 2 trainings of 2M frames" in said  # the rows of merge-order share those of hoz
     assert "--estimate" in said
     assert run(["reproduce", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["methods"]["rows"][-1] == "oracle"
@@ -25,12 +33,21 @@ def test_without_a_table_all_are_listed(capsys: pytest.CaptureFixture[str]) -> N
         (["tabel"], "table"),
         (["methods", "--budget", "none"], "budget"),
         (["methods", "--row", "hoz2"], "row"),
-        (["methods", "--row", "hoz", "--collect"], "--collect"),
+        (["methods", "--row", "hoz", "--collect"], "--row chooses"),
+        (["methods", "--estimate", "--collect"], "--estimate says"),
+        (["methods", "--estimate", "--docs", "docs"], "--estimate makes no files"),
     ],
 )
 def test_what_does_not_exist_is_said(words: list[str], sentence: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["reproduce", *words]) == EXIT_USER_ERROR
     assert sentence in capsys.readouterr().err
+
+
+def test_help_says_what_a_budget_gives(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["reproduce", "--help"]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "quick: 2M frames in rooms, 3M in apartments, 1-2 seeds;" in said
+    assert "full: 16M frames in rooms, 24M in apartments, 5 seeds." in said
 
 
 def test_a_table_can_be_shown_before_anything_is_finished(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -61,18 +78,32 @@ def test_results_are_read_written_and_counted_once(tmp_path: Path) -> None:
     assert written["rows"]["hoz"]["seeds"] == [0, 1]
     for seed, job in enumerate(jobs["hoz"][:2]):
         assert tmp_path / written["rows"]["hoz"]["runs"][str(seed)]["file"] == job.result(tmp_path)
+    # Two trainings and choices, which two rows share, and two tests of each row.
+    assert results.hours == pytest.approx((2 * (60 + 1) + 4 * 3) / 3600)
     folder = jobs["other order"][0].result(tmp_path).parent.relative_to(tmp_path)
     assert f"other order `{folder}`" in paths[0].read_text()
 
 
-def test_a_table_shows_the_sessions_of_its_own_budget(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("words", "stem", "own"),
+    [
+        (["--budget", "full"], "zones-full", [1]),
+        (["--seeds", "4"], "zones-quick-seeds-4", [4]),
+        ([], "zones-quick", [0]),
+    ],
+)
+def test_a_table_shows_its_own_sessions(tmp_path: Path, words: list[str], stem: str, own: list[int]) -> None:
     sessions = [
-        {"table": table, "budget": budget, "took_seconds": number}
-        for number, (table, budget) in enumerate([("zones", "quick"), ("zones", "full"), ("methods", "quick")])
+        {"table": "zones", "budget": "quick", "took_seconds": None},  # from before --seeds was noted
+        {"table": "zones", "budget": "full", "took_seconds": 1.0, "seeds": None, "rows": ["hoz"]},
+        {"table": "methods", "budget": "quick", "took_seconds": 2.0},
+        {"table": "zones", "budget": "quick", "took_seconds": 3.0, "seeds": 3, "rows": []},
+        {"table": "zones", "budget": "quick", "took_seconds": 4.0, "seeds": 4, "rows": []},
     ]
     (tmp_path / "sessions.json").write_text(json.dumps(sessions))
-    assert run(["reproduce", "zones", "--budget", "full", "--collect", "--out", str(tmp_path)]) == 0
-    assert json.loads((tmp_path / "zones-full.json").read_text())["sessions"] == [sessions[1]]
+    assert run(["reproduce", "zones", *words, "--collect", "--out", str(tmp_path)]) == 0
+    shown = json.loads((tmp_path / f"{stem}.json").read_text())["sessions"]
+    assert shown == [sessions[number] for number in own]
 
 
 @pytest.mark.parametrize(("seeds", "stem"), [(2, "methods-full-seeds-2"), (5, "methods-full")])
@@ -80,3 +111,39 @@ def test_a_table_of_other_seeds_does_not_overwrite_the_whole_one(tmp_path: Path,
     words = ["reproduce", "methods", "--budget", "full", "--collect", "--out", str(tmp_path), "--seeds", str(seeds)]
     assert run(words) == 0
     assert {path.name for path in tmp_path.iterdir()} == {f"{stem}.md", f"{stem}.json"}
+
+
+def test_a_second_command_on_one_folder_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with FileLock(tmp_path / "reproduce.lock"):
+        assert run(["reproduce", "methods", "--out", str(tmp_path)]) == EXIT_USER_ERROR
+    said = capsys.readouterr().err
+    assert said.startswith(f"hoz-dist: Another hoz-dist reproduce works in '{tmp_path}'")
+    assert said.count("\n") == 1
+
+
+def test_files_for_the_documentation_are_those_of_the_folder(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shutil.copytree(DOCS, tmp_path / "out")
+    words = ["--out", str(tmp_path / "out"), "--docs", str(tmp_path / "docs" / "new")]
+    assert run(["reproduce", "methods", "--collect", *words, "--json"]) == 0
+    out, err = capsys.readouterr()
+
+    names = [f"methods-quick.{suffix}" for suffix in ("md", "json", "png")]
+    for name in names:
+        assert (tmp_path / "docs" / "new" / name).read_bytes() == (tmp_path / "out" / name).read_bytes()
+    folders = (tmp_path / "out", tmp_path / "docs" / "new")
+    assert err == f"Written: {', '.join(str(folder / name) for folder in folders for name in names)}\n"
+
+    # What is published is what the published outcomes of episodes say.
+    published = json.loads((DOCS / "methods-quick.json").read_text())
+    assert means(json.loads(out)) == means(published)
+    assert (json.loads(out)["unfinished"], json.loads(out)["hours"]) == ({}, published["hours"])
+
+
+def means(results: dict[str, Any]) -> dict[str, dict[str, float]]:
+    """The mean of each metric, by row, over all episodes and the long ones."""
+    return {
+        name: {f"{part} {metric}": row[part][metric]["mean"] for part in ("all", "long") for metric in METRICS}
+        for name, row in results["rows"].items()
+    }

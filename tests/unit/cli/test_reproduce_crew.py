@@ -10,8 +10,10 @@ import pytest
 from hoz_dist.cli import reproduce_costs
 from hoz_dist.cli.reproduce_crew import Worker
 from hoz_dist.cli.reproduce_task import Report
-from hoz_dist.errors import HozError
+from hoz_dist.errors import HozError, OwnMistakeError
+from hoz_dist.reproduce.costs import Speed
 from hoz_dist.reproduce.job import jobs_of, tasks_of
+from tests.unit.cli.workers import Worked
 from tests.unit.reproduce.making import TABLE, TINY
 
 
@@ -28,30 +30,24 @@ def test_a_full_disk_is_no_mistake_of_ours() -> None:
     assert report == Report("failed", note="'somewhere': No space left on device.")
 
 
-class Ended:
-    """A worker that has ended without a word."""
-
-    connection = None
-
-    def __init__(self, status: int) -> None:
-        self.exit_status = status
-
-    def receive(self) -> list[Any]:
-        return []
-
-    def terminate(self) -> None:
-        pass
-
-    def join(self) -> None:
-        pass
-
-
-@pytest.mark.parametrize(("status", "reason"), [(-9, "use fewer --jobs"), (1, "a mistake of ours")])
+@pytest.mark.parametrize(
+    ("status", "kind", "reason"), [(-9, HozError, "use fewer --jobs"), (1, OwnMistakeError, "a mistake of ours")]
+)
 def test_a_measurement_that_was_killed_is_told_from_one_that_failed(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, status: int, reason: str
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, status: int, kind: type[Exception], reason: str
 ) -> None:
-    monkeypatch.setattr(reproduce_costs, "Worker", lambda *_: Ended(status))
+    monkeypatch.setattr(reproduce_costs, "Worker", lambda *_: Worked(status))
     monkeypatch.setattr(reproduce_costs, "wait", lambda *_: [])
     (task,) = tasks_of(jobs_of(TABLE, TABLE.rows[1], TINY), tmp_path)
-    with pytest.raises(HozError, match=reason):
+    with pytest.raises(kind, match=reason):
         reproduce_costs._speeds({"object": task}, tmp_path, 1)
+
+
+def test_measuring_waits_only_for_processes_that_owe_something(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    quick, slow = Worked(0, [Speed(1.0, 0.1)]), Worked(0, [], [Speed(3.0, 0.3)])
+    workers, waited = iter([quick, slow]), list[list[object]]()
+    monkeypatch.setattr(reproduce_costs, "Worker", lambda *_: next(workers))
+    monkeypatch.setattr(reproduce_costs, "wait", lambda connections, _: waited.append(list(connections)))
+    (task,) = tasks_of(jobs_of(TABLE, TABLE.rows[1], TINY), tmp_path)
+    assert reproduce_costs._speeds({"object": task}, tmp_path, 2) == {"object": Speed(2.0, 0.2)}
+    assert waited == [[quick.connection, slow.connection], [slow.connection]]

@@ -56,3 +56,13 @@ def test_a_result_tells_the_time_of_the_whole_training_and_that_to_the_checkpoin
     reproduce_task._test(job, Place(tmp_path, tmp_path), lambda _: None)
     facts = Outcome.load(job.result(tmp_path)).facts
     assert (facts["frames"], facts["seconds_to_chosen"], facts["training_seconds"]) == (2000, 20.0, 40.0)
+
+
+@pytest.mark.usefixtures("benchmark")
+def test_a_checkpoint_that_is_gone_is_chosen_anew(tmp_path: Path, job: Job) -> None:
+    assert job.training is not None
+    file = job.choice(tmp_path)
+    file.write_text(json.dumps({"checkpoint": "0001-000000050.safetensors", "seconds": 1.0}))
+    chosen, choice = reproduce_task._choose(job, job.training, Place(tmp_path, tmp_path), lambda _: None)
+    assert (chosen.version, choice["checkpoint"]) == (40, "0003-000000040.safetensors")
+    assert json.loads(file.read_text()) == choice

@@ -65,6 +65,7 @@ def test_an_evaluation_is_kept_as_it_was(tmp_path: Path) -> None:
         {"rooms": ["kitchen/26"]},
         {"success": "1"},
         {"moves": [[100] * 40] * 3},
+        {"moves": [[0] * 40] * 3, "actions": [[0] * 40] * 3},
         {"facts": None, "actions": None},
     ],
 )

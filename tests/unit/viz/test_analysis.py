@@ -15,8 +15,9 @@ METHODS = [Analysis("one", ((WON, FAR, BLIND, LONG),)), Analysis("other", ((WON,
 
 
 def test_bars_stack_the_failures_of_each_method() -> None:
-    figure = failure_figure(METHODS)
+    figure = failure_figure(METHODS, "test rooms")
     (axes,) = figure.axes
+    assert axes.get_title() == "Why episodes fail, test rooms"
     assert [label.get_text() for label in axes.get_xticklabels()] == ["one", "other"]
     stacks = [container for container in axes.containers if isinstance(container, BarContainer)]
     assert [stack.get_label() for stack in stacks] == [CAUSE_NAMES[cause] for cause in FAILURES]
@@ -29,8 +30,9 @@ def test_bars_stack_the_failures_of_each_method() -> None:
 
 
 def test_success_against_the_optimal_path_has_a_line_with_intervals_for_each_method() -> None:
-    figure = length_figure(METHODS)
+    figure = length_figure(METHODS, "test rooms")
     (axes,) = figure.axes
+    assert axes.get_title() == "Success against optimal path, test rooms"
     assert [label.get_text() for label in axes.get_xticklabels()] == ["1-4\n(3)", "5-9\n(1)"]
     lines = [container for container in axes.containers if isinstance(container, ErrorbarContainer)]
     assert [line.get_label() for line in lines] == ["one", "other"]
@@ -50,3 +52,12 @@ def test_learning_curves_show_the_mean_and_the_range_of_a_methods_runs() -> None
     band = np.asarray(axes.collections[0].get_paths()[0].vertices)
     assert set(band[:, 1]) == {20.0, 40.0, 60.0, 70.0}
     assert png(figure)
+
+
+def test_runs_without_frames_in_common_are_drawn_one_by_one() -> None:
+    runs = [LearningCurve((1_000_000, 2_000_000), (20.0, 60.0)), LearningCurve((3_000_000,), (40.0,))]
+    (axes,) = learning_figure({"hoz": runs}).axes
+    assert [line.get_label() for line in axes.lines] == ["hoz (run 1)", "hoz (run 2)"]
+    np.testing.assert_array_equal(axes.lines[0].get_xydata(), [[1.0, 20.0], [2.0, 60.0]])
+    np.testing.assert_array_equal(axes.lines[1].get_xydata(), [[3.0, 40.0]])
+    assert not axes.collections
