@@ -20,6 +20,7 @@ from hoz_dist.gradient_forms import Vector
 from hoz_dist.graph.room_graph import RoomGraph
 from hoz_dist.nav.categories import TARGETS
 from hoz_dist.nav.rooms import RoomId
+from hoz_dist.policy.parameters import check_fit
 from hoz_dist.wire.protocol.answers import Accepted, Busy, Refused
 from hoz_dist.wire.protocol.pushes import GradientPush, RoomGraphPush
 from hoz_dist.wire.protocol.rejection import Reason, RejectedError
@@ -383,12 +384,7 @@ class LearnerCore:
         return round(max(self.config.frames - self.statistics.frames, 0) / rate, 1)
 
     def _resume(self, checkpoint: Checkpoint, room_digests: Mapping[str, str]) -> None:
-        if checkpoint.parameters.size != self._optimizer.size:
-            message = (
-                f"The checkpoint has {checkpoint.parameters.size} parameters, the policy of its configuration "
-                f"{self._optimizer.size}: it was written by another version of hoz-dist."
-            )
-            raise InvalidValueError(message)
+        check_fit(checkpoint.parameters.size, self._optimizer.size)
         self._optimizer = FlatAdam(checkpoint.parameters, self.config.learning_rate)
         self._optimizer.load_state(checkpoint.adam)
         self.version = checkpoint.version

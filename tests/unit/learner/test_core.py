@@ -359,6 +359,12 @@ def test_a_resumed_run_continues_as_if_never_interrupted(budget: dict[str, float
         assert then[0][name] == then[1][name], name
 
 
+def test_a_checkpoint_of_another_network_is_refused() -> None:
+    checkpoint = new_core().snapshot(0.0)
+    with pytest.raises(InvalidValueError, match=f"has {SIZE} parameters, .* {SIZE + 2}: .* older version of hoz-dist"):
+        LearnerCore(CONFIG, np.zeros(SIZE + 2, np.float32), checkpoint=checkpoint)
+
+
 def test_what_was_saved_is_not_counted_again_after_a_restart() -> None:
     core = new_core()
     push(core, gradient(0))
