@@ -53,8 +53,8 @@ from learner.replay import Schedule, UpdateRecord
 from learner.rollout_gradients import Learnt, RolloutGradients
 from learner.statistics import Statistics
 
-LOSS_TERMS: Final = ("policy_loss", "value_loss", "entropy", "scene_loss")
-"""Fields of `EpisodesPush` that are recorded for TensorBoard."""
+LOSS_TERMS: Final = ("policy_loss", "value_loss", "entropy", "scene_loss", "imitation_loss", "approach_loss")
+"""Fields of `EpisodesPush` that are recorded for TensorBoard, where they are not None."""
 GRAPH_CHECKPOINT_SECONDS: Final = 2.0
 """A new room graph is saved this soon: rooms are few, and each took an actor a whole exploration."""
 
@@ -294,7 +294,8 @@ class LearnerCore:
         self._seen.add(sender, push.sequence)
         actor = self.statistics.actor(push.actor, push.incarnation, now)
         if self._rollouts is None:  # otherwise this process computes the losses itself
-            self.statistics.losses = {name: getattr(push, name) for name in LOSS_TERMS}
+            told = {name: getattr(push, name) for name in LOSS_TERMS}
+            self.statistics.losses = {name: value for name, value in told.items() if value is not None}
         for episode in push.episodes:
             actor.rooms.add(str(episode.room))
             self.statistics.finished(episode.room.scene, success=episode.success)
