@@ -26,7 +26,18 @@ from learner.core import LearnerCore
 from learner.events import EpisodesReceived, RoomGraphReceived
 from learner.leadership import DeposedError
 from tests.unit.learner.disk import PASSING, full_disk, unreadable
-from tests.unit.learner.making import CONFIG, answer, episodes, gradient, leading, push, room_graph, room_push, vector
+from tests.unit.learner.making import (
+    CONFIG,
+    SIZE,
+    answer,
+    episodes,
+    gradient,
+    leading,
+    push,
+    room_graph,
+    room_push,
+    vector,
+)
 
 
 @pytest.fixture
@@ -224,6 +235,12 @@ def test_one_of_an_older_hoz_dist_is_refused_by_name_and_not_passed_over(
     for place in (path, tmp_path):
         with pytest.raises(InvalidValueError, match=rf"'{path}' cannot be used: .* not of this version of hoz-dist"):
             load_checkpoint(place)
+
+
+def test_one_of_another_network_is_not_gone_on_from(checkpoint: Checkpoint) -> None:
+    complaint = f"has {SIZE} parameters, .* {SIZE + 2}: it may be of an older version of hoz-dist"
+    with pytest.raises(InvalidValueError, match=complaint):
+        LearnerCore(CONFIG, vector(0, SIZE + 2), checkpoint=checkpoint)
 
 
 def test_a_missing_file_and_a_folder_without_checkpoints_are_told_apart_from_damage(tmp_path: Path) -> None:

@@ -359,22 +359,6 @@ def test_a_resumed_run_continues_as_if_never_interrupted(budget: dict[str, float
         assert then[0][name] == then[1][name], name
 
 
-def test_the_status_has_the_losses_that_an_actor_told_of() -> None:
-    core = new_core()
-    assert core.status(0.0)["losses"] == {}
-    told = {"policy_loss": -0.5, "value_loss": 0.25, "entropy": 1.5, "scene_loss": 0.0, "approach_loss": 0.75}
-    answer(core, EpisodesReceived(0, replace(episodes(0), **told)))  # type: ignore[arg-type]
-    assert core.status(0.0)["losses"] == told
-    answer(core, EpisodesReceived(0, replace(episodes(1), imitation_loss=0.125)))
-    assert set(core.status(0.0)["losses"]) == {"policy_loss", "value_loss", "entropy", "scene_loss", "imitation_loss"}
-
-
-def test_a_checkpoint_of_another_network_is_refused() -> None:
-    checkpoint = new_core().snapshot(0.0)
-    with pytest.raises(InvalidValueError, match=f"has {SIZE} parameters, .* {SIZE + 2}: .* older version of hoz-dist"):
-        LearnerCore(CONFIG, np.zeros(SIZE + 2, np.float32), checkpoint=checkpoint)
-
-
 def test_what_was_saved_is_not_counted_again_after_a_restart() -> None:
     core = new_core()
     push(core, gradient(0))

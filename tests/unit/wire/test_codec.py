@@ -127,22 +127,6 @@ def test_languages_with_one_type_of_number_may_send_whole_numbers() -> None:
     assert decode(data, EpisodesPush).value_loss == 120.0
 
 
-def test_an_optional_field_may_be_left_out_and_nothing_may_stand_for_it() -> None:
-    """Actors that do not know a loss that learners have learnt to ask for are understood."""
-    sent = samples.MESSAGES[1]
-    fields, _ = split(encode(sent))
-    assert fields["approach_loss"] == 0.5
-    assert "imitation_loss" not in fields
-    del fields["approach_loss"]
-    told = decode(joined(fields, b""), EpisodesPush)
-    assert (told.policy_loss, told.imitation_loss, told.approach_loss) == (-0.5, None, None)
-    for nothing in (None, float("nan"), "0.5"):
-        reason = Reason.NONFINITE if isinstance(nothing, float) else Reason.TYPE
-        assert reason_of(altered(sent, approach_loss=nothing), EpisodesPush) == reason
-    del fields["policy_loss"]
-    assert reason_of(joined(fields, b""), EpisodesPush) == Reason.FIELDS
-
-
 PUSH = samples.gradient_push()
 TENSOR = fields_of(PUSH)["gradient"]["values"]
 BULK = split(encode(PUSH))[1]
