@@ -194,21 +194,20 @@ class RunConfig:
         """Read a configuration.
 
         Args:
-            values: What `to_json` returned, perhaps by way of a file or the network; of an older run, fields that there
-                were not yet have the values of `_LATER`, which is how it was then.
+            values: What `to_json` returned, perhaps by way of a file or the network. No older run's will do: its
+                network had fewer parameters than this version's.
 
         Raises:
             InvalidValueError: A field is missing, unknown, of the wrong type or out of range.
             UnknownNameError: A value of a field with named values does not exist.
         """
         known = {field.name: field for field in fields(cls)}
-        if isinstance(values, dict):
-            values = _LATER | values
         if not isinstance(values, dict) or set(values) != set(known):
             given = set(values) if isinstance(values, dict) else set()
-            wrong = sorted(str(name) for name in given ^ set(known))
+            wrong = ", ".join(sorted(str(name) for name in given ^ set(known))) or "all"
             message = (
-                f"Not a configuration of this version of hoz-dist; missing or unknown: {', '.join(wrong) or 'all'}."
+                f"The configuration is not of this version of hoz-dist (missing or unknown: {wrong}); "
+                "use the version that made it, or train anew."
             )
             raise InvalidValueError(message)
         for name, value in values.items():
@@ -250,7 +249,8 @@ _LATER: Final[dict[str, Any]] = {
     "approach_frames": 2_000_000,
     "relations": [],
 }
-"""Fields that the first run folders do not have, and what they were then."""
+"""Fields that came after the first runs, and what was done before there was a choice: a digest of the rest is still
+the one under which `hoz-dist reproduce` keeps runs."""
 _RANGES: Final = (
     ("channels", 1, 4096),
     ("picture_size", 16, 512),

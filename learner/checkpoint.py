@@ -185,7 +185,7 @@ def load_checkpoint(path: Path) -> Checkpoint:
         NotFoundError: There is no such file, or no checkpoint in the folder.
         DamagedFileError: The file, or every checkpoint of the folder, is damaged or something else.
         UnreadableError: The system cannot read it now; nobody knows whether it is damaged.
-        InvalidValueError: The checkpoint is of another version of the format.
+        InvalidValueError: The checkpoint is of another version of the format, or of hoz-dist.
     """
     with reading(path):
         if not path.is_dir():
@@ -213,7 +213,7 @@ def newest_readable(
         NotFoundError: There is no checkpoint in the folder.
         DamagedFileError: Every checkpoint is damaged or something else.
         UnreadableError: The folder, or a checkpoint newer than all that can be read, cannot be read now.
-        InvalidValueError: The newest that is not damaged is of another version of the format.
+        InvalidValueError: The newest that is not damaged is of another version of the format, or of hoz-dist.
     """
     with reading(folder):
         files = checkpoint_files(folder)
@@ -352,13 +352,18 @@ def _load_file(path: Path) -> Checkpoint:
     if values["format"] != FORMAT:
         message = f"'{path}' has checkpoint format {values['format']}; this version of hoz-dist reads format {FORMAT}."
         raise InvalidValueError(message)
-    return _checkpoint_of(values, tensors)
+    try:
+        config = RunConfig.from_json(values["config"])
+    except HozError as error:
+        message = f"'{path}' cannot be used: {error}"
+        raise InvalidValueError(message) from error
+    return _checkpoint_of(config, values, tensors)
 
 
-def _checkpoint_of(values: Mapping[str, Any], tensors: Mapping[str, NDArray[Any]]) -> Checkpoint:
+def _checkpoint_of(config: RunConfig, values: Mapping[str, Any], tensors: Mapping[str, NDArray[Any]]) -> Checkpoint:
     """Put a checkpoint together; the digest has vouched for the parts."""
     return Checkpoint(
-        config=RunConfig.from_json(values["config"]),
+        config=config,
         epoch=values["epoch"],
         version=values["version"],
         frames=values["frames"],

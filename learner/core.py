@@ -20,6 +20,7 @@ from hoz_dist.gradient_forms import Vector
 from hoz_dist.graph.room_graph import RoomGraph
 from hoz_dist.nav.categories import TARGETS
 from hoz_dist.nav.rooms import RoomId
+from hoz_dist.policy.parameters import check_fit
 from hoz_dist.wire.protocol.answers import Accepted, Busy, Refused
 from hoz_dist.wire.protocol.pushes import GradientPush, RoomGraphPush
 from hoz_dist.wire.protocol.rejection import Reason, RejectedError
@@ -52,8 +53,8 @@ from learner.replay import Schedule, UpdateRecord
 from learner.rollout_gradients import Learnt, RolloutGradients
 from learner.statistics import Statistics
 
-LOSS_TERMS: Final = ("policy_loss", "value_loss", "entropy", "scene_loss")
-"""Fields of `EpisodesPush` that are recorded for TensorBoard."""
+LOSS_TERMS: Final = ("policy_loss", "value_loss", "entropy", "scene_loss", "imitation_loss", "approach_loss")
+"""Fields of `EpisodesPush` that are recorded for TensorBoard, where they are not None."""
 GRAPH_CHECKPOINT_SECONDS: Final = 2.0
 """A new room graph is saved this soon: rooms are few, and each took an actor a whole exploration."""
 
@@ -293,7 +294,8 @@ class LearnerCore:
         self._seen.add(sender, push.sequence)
         actor = self.statistics.actor(push.actor, push.incarnation, now)
         if self._rollouts is None:  # otherwise this process computes the losses itself
-            self.statistics.losses = {name: getattr(push, name) for name in LOSS_TERMS}
+            told = {name: getattr(push, name) for name in LOSS_TERMS}
+            self.statistics.losses = {name: value for name, value in told.items() if value is not None}
         for episode in push.episodes:
             actor.rooms.add(str(episode.room))
             self.statistics.finished(episode.room.scene, success=episode.success)
@@ -383,12 +385,7 @@ class LearnerCore:
         return round(max(self.config.frames - self.statistics.frames, 0) / rate, 1)
 
     def _resume(self, checkpoint: Checkpoint, room_digests: Mapping[str, str]) -> None:
-        if checkpoint.parameters.size != self._optimizer.size:
-            message = (
-                f"The checkpoint has {checkpoint.parameters.size} parameters, the policy of its configuration "
-                f"{self._optimizer.size}: it was written by another version of hoz-dist."
-            )
-            raise InvalidValueError(message)
+        check_fit(checkpoint.parameters.size, self._optimizer.size)
         self._optimizer = FlatAdam(checkpoint.parameters, self.config.learning_rate)
         self._optimizer.load_state(checkpoint.adam)
         self.version = checkpoint.version

@@ -5,8 +5,8 @@ from typing import Final, NamedTuple, Self
 
 from torch import Tensor
 
-from hoz_dist.policy.actor_critic import State
 from hoz_dist.policy.navigator import ZoneState
+from hoz_dist.policy.state import State
 from hoz_dist.wire.protocol.pushes import Push
 
 MOST_STATES: Final = 4096

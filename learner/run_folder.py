@@ -241,7 +241,10 @@ def read_config(path: Path) -> RunConfig:
         raise NotFoundError(message) from error
     except OSError as error:
         raise UnreadableError(file, error) from error
-    except (ValueError, HozError) as error:
+    except HozError as error:
+        message = f"'{file}' cannot be used: {error}"
+        raise DamagedFileError(message) from error
+    except ValueError as error:
         message = f"Cannot read '{file}' ({error}); mend it or choose another run folder."
         raise DamagedFileError(message) from error
 

@@ -5,6 +5,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final, NamedTuple
 
+from hoz_dist.a3c.loss import mean_terms
+
 SUCCESS_WINDOW: Final = 1000
 """Episodes over which the success rate is taken."""
 LAG_WINDOW: Final = 1000
@@ -119,7 +121,7 @@ class Statistics:
     def learnt(self, losses: Mapping[str, float]) -> None:
         """Note the terms of a rollout's loss, which go up and down from one to the next."""
         self._losses.append(losses)
-        self.losses = {name: sum(one[name] for one in self._losses) / len(self._losses) for name in losses}
+        self.losses = mean_terms(self._losses)
 
     def finished(self, scene: str, *, success: bool) -> None:
         """Count a finished episode."""

@@ -111,7 +111,7 @@ def trajectory_push(steps: Steps | None = None, rooms: int = 1) -> TrajectoryPus
 HEAD = ParametersHead(epoch=1, version=5, size=100)
 MESSAGES: tuple[Message, ...] = (
     gradient_push(),
-    EpisodesPush("a0", 77, 3, episodes=(EPISODE, EPISODE), policy_loss=-0.5, entropy=1.75),
+    EpisodesPush("a0", 77, 3, episodes=(EPISODE, EPISODE), policy_loss=-0.5, entropy=1.75, approach_loss=0.5),
     RoomGraphPush("a0", 77, 0, ROOM, "d1", TARGETS, *zone_graph()),
     Accepted(1, 5),
     Busy(1),

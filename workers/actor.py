@@ -8,13 +8,13 @@ threads only keep what arrived.
 import logging
 import threading
 import zlib
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
 
+from hoz_dist.a3c.loss import mean_terms
 from hoz_dist.errors import HozError
 from hoz_dist.graph.room_graph import RoomGraph
 from hoz_dist.nav.encoder import VisualEncoder
@@ -58,10 +58,8 @@ class _Report:
     """What happened since the last report."""
 
     rollouts: int = 0
-    updates: int = 0
-    """Gradients that the learner accepted."""
-    losses: Counter[str] = field(default_factory=Counter)
-    """Sums of the terms of the loss over them."""
+    losses: list[dict[str, float]] = field(default_factory=list)
+    """Terms of the loss of each gradient that the learner accepted."""
     episodes: list[EpisodeResult] = field(default_factory=list)
 
     def add(self, finished: list[EpisodeResult]) -> None:
@@ -73,11 +71,6 @@ class _Report:
     def is_due(self) -> bool:
         """Whether it is time to send it."""
         return self.rollouts >= REPORT_ROLLOUTS or len(self.episodes) >= REPORT_EPISODES
-
-    @property
-    def mean_losses(self) -> dict[str, float]:
-        """Means of the terms of the loss; empty, which the wire takes for 0, if no gradient was accepted."""
-        return {name: total / self.updates for name, total in self.losses.items()}
 
 
 class Actor:
@@ -232,8 +225,7 @@ class Actor:
             with self._clock("push"):
                 reply = self._link.push_gradient(update.gradient, update.frames, parameters.head.stamp)
             if self._settle("gradient", reply, update.frames):
-                self._report.updates += 1
-                self._report.losses.update(update.loss.terms())
+                self._report.losses.append(update.loss.terms())
         if self._report.is_due:
             self._send(self._take_report())
 
@@ -300,7 +292,7 @@ class Actor:
 
     def _send(self, report: _Report) -> None:
         with self._clock("report"):
-            reply = self._link.push_episodes(report.episodes, report.mean_losses)
+            reply = self._link.push_episodes(report.episodes, mean_terms(report.losses))
         match reply:
             case Refused(reason, detail) if reason != Reason.FINISHED:
                 _log.warning("a report of %d episodes was refused (%s): %s", len(report.episodes), reason, detail)

@@ -16,11 +16,12 @@ from hoz_dist.graph.scene_graph import SceneGraph
 from hoz_dist.nav.categories import SCENES
 from hoz_dist.nav.episode import EpisodeResult
 from hoz_dist.nav.observation import Observation
-from hoz_dist.policy.actor_critic import ActorCritic, State
+from hoz_dist.policy.actor_critic import ActorCritic
 from hoz_dist.policy.graph_bank import GraphBank
 from hoz_dist.policy.navigator import Guidance
 from hoz_dist.policy.parameters import FlatParameters, make_policy
 from hoz_dist.policy.sampling import sample_actions
+from hoz_dist.policy.state import State
 from hoz_dist.policy.tape import Tape
 from hoz_dist.sim.batch_env import BatchEnv
 from hoz_dist.sim.expert import ExpertTable

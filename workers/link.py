@@ -230,8 +230,8 @@ class LearnerLink(Closing):
 
         Args:
             episodes: Results, in the order in which the episodes ended.
-            losses: Means since the last push of ``policy_loss``, ``value_loss``, ``entropy`` and ``scene_loss``; 0 for
-                what is left out.
+            losses: Means since the last push of the terms of the loss, by the names of the fields of `EpisodesPush`;
+                what is left out has that field's default.
 
         Returns:
             The answer to the last message, or the first refusal, after which nothing more is pushed.

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from hoz_dist.nav.observation import Observation
-from hoz_dist.policy.actor_critic import Decision
+from hoz_dist.policy.state import Decision
 from hoz_dist.sim.batch_env import Places, Step
 from hoz_dist.sim.room_views import RoomViews
 from hoz_dist.wire.protocol.trajectories import Flag, RoomUsed, Steps

@@ -11,10 +11,11 @@ from hoz_dist.a3c.norm import clip_norm
 from hoz_dist.a3c.rollout import Rollout
 from hoz_dist.config import RunConfig
 from hoz_dist.nav.observation import Observation
-from hoz_dist.policy.actor_critic import ActorCritic, State, Unrolled
+from hoz_dist.policy.actor_critic import ActorCritic
 from hoz_dist.policy.graph_bank import GraphBank
 from hoz_dist.policy.navigator import Guidance
 from hoz_dist.policy.parameters import FlatParameters
+from hoz_dist.policy.state import State, Unrolled
 from hoz_dist.policy.tape import Tape
 
 

@@ -1,5 +1,7 @@
 """The loss of A3C (Mnih et al. 2016, Algorithm S3), of the scene layer, and of imitation."""
 
+from collections.abc import Collection, Mapping
+from statistics import fmean
 from typing import NamedTuple
 
 import torch
@@ -35,17 +37,32 @@ class Loss(NamedTuple):
     value: float
     entropy: float
     scene: float
-    imitation: float = 0.0
-    approach: float = 0.0
+    imitation: float | None = None
+    """None where nothing is imitated."""
+    approach: float | None = None
+    """None where the approach is not taught, as once its weight is 0; 0 in a rollout in which no target was seen."""
 
     def terms(self) -> dict[str, float]:
-        """Return the terms by the names that are reported: those that every method may have."""
-        return {
+        """Return the terms that there are, by the names that are reported."""
+        terms = {
             "policy_loss": self.policy,
             "value_loss": self.value,
             "entropy": self.entropy,
             "scene_loss": self.scene,
+            "imitation_loss": self.imitation,
+            "approach_loss": self.approach,
         }
+        return {name: value for name, value in terms.items() if value is not None}
+
+
+def mean_terms(losses: Collection[Mapping[str, float]]) -> dict[str, float]:
+    """Return the mean of each term over those losses that have it.
+
+    Args:
+        losses: What `Loss.terms` returned.
+    """
+    names = dict.fromkeys(name for terms in losses for name in terms)
+    return {name: fmean(terms[name] for terms in losses if name in terms) for name in names}
 
 
 def a3c_loss(
@@ -98,7 +115,7 @@ def a3c_loss(
     if scene_logits is not None and scenes is not None:
         scene = functional.cross_entropy(scene_logits.flatten(0, 1), scenes.flatten())
         total = total + weights.scene * scene
-    imitated = approached = torch.zeros(())
+    imitated = approached = None
     if imitation is not None and rollout.expert is not None:
         taught = functional.log_softmax(imitation.logits, dim=-1)  # [T, B, K, 6]
         counts = (imitation.counts & rollout.valid).unsqueeze(-1).expand(taught.shape[:-1])
@@ -107,8 +124,9 @@ def a3c_loss(
     if target_seen is not None and rollout.expert is not None and weights.approach > 0.0:
         approached = _surprise(log_probabilities, rollout.expert, target_seen & rollout.valid) / count
         total = total + weights.approach * approached
-    terms = (policy, value, entropy, scene, imitated, approached)
-    return Loss(total, *(term.item() for term in terms))
+    always = (term.item() for term in (policy, value, entropy, scene))
+    where_taught = (None if term is None else term.item() for term in (imitated, approached))
+    return Loss(total, *always, *where_taught)
 
 
 def _surprise(log_probabilities: Tensor, expert: Tensor, counts: Tensor) -> Tensor:

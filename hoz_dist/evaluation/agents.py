@@ -9,9 +9,10 @@ from torch import Tensor
 
 from hoz_dist.graph.planner import target_zone
 from hoz_dist.nav.actions import Action
-from hoz_dist.policy.actor_critic import ActorCritic, Decision
+from hoz_dist.policy.actor_critic import ActorCritic
 from hoz_dist.policy.graph_bank import GraphBank
 from hoz_dist.policy.sampling import sample_actions
+from hoz_dist.policy.state import Decision
 from hoz_dist.sim.episode_runner import EpisodeRunner
 from hoz_dist.sim.expert import expert_actions
 from hoz_dist.sim.room_views import RoomViews

@@ -7,13 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoz_dist.config import RunConfig
-from hoz_dist.errors import DamagedFileError, InvalidValueError, NotFoundError
+from hoz_dist.errors import InvalidValueError, NotFoundError
 from hoz_dist.evaluation.agents import TEMPERATURE, PolicyAgent
 from hoz_dist.graph.scene_graph import SceneGraph
 from hoz_dist.nav.encoder import VisualEncoder
 from hoz_dist.policy.encoders import load_encoder
 from hoz_dist.policy.graph_bank import GraphBank
-from hoz_dist.policy.parameters import FlatParameters, make_policy
+from hoz_dist.policy.parameters import FlatParameters, check_fit, make_policy
 
 
 def load_agent(
@@ -31,15 +31,13 @@ def load_agent(
         temperature: By which logits are divided before actions are drawn.
 
     Raises:
-        DamagedFileError: The parameters are not those of the configuration's network.
+        InvalidValueError: The parameters are not those of the configuration's network.
         NotFoundError: The method is guided by graphs and there is none.
     """
     policy = make_policy(config.policy, config.seed)
-    try:
-        FlatParameters(policy).load(parameters)
-    except ValueError as error:
-        message = f"The checkpoint's parameters do not fit its configuration ({error}); use another checkpoint."
-        raise DamagedFileError(message) from error
+    flat = FlatParameters(policy)
+    check_fit(parameters.size, flat.values.numel())
+    flat.load(parameters)
     if config.policy.zone_layer and not graphs:
         message = "The checkpoint holds no scene graph, so its agent has nothing to be guided by; train longer."
         raise NotFoundError(message)

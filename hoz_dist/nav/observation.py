@@ -20,6 +20,6 @@ class Observation(NamedTuple):
     previous_action: NDArray[np.int64]
     """Action taken at the step before, as it was `hoz_dist.nav.feedback.felt`, [B]; ``NO_ACTION`` at the first step."""
     scene: NDArray[np.int64]
-    """True scene, [B]: label of the scene layer, never an input of a policy."""
+    """True scene, [B]: label of the scene layer, and chooses the graph where that is off (``--without scene``)."""
     first: NDArray[np.bool_]
     """Whether this is the first step of an episode, [B]."""

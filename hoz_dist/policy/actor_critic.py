@@ -5,8 +5,6 @@ step by step and decides which scene, zone and sub-goal to use (`act`); training
 those decisions given, as it goes with the actions given (`unroll`).
 """
 
-from typing import Final, NamedTuple
-
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
@@ -15,106 +13,18 @@ from hoz_dist.nav.actions import Action
 from hoz_dist.nav.categories import TARGETS
 from hoz_dist.nav.feedback import PREVIOUS_ACTIONS
 from hoz_dist.nav.observation import Observation
-from hoz_dist.policy.branches import BRANCHES
+from hoz_dist.policy.branches import BRANCHES, MAP_AXES
 from hoz_dist.policy.graph_bank import GraphBank
+from hoz_dist.policy.inputs import Inputs
 from hoz_dist.policy.layers import DoneReminder, SceneLayer, ZoneLayer
 from hoz_dist.policy.navigator import Guidance, ZoneState, guide, initial_zone_state
 from hoz_dist.policy.recurrent import EpisodicLSTM
 from hoz_dist.policy.settings import PolicySettings
-from hoz_dist.policy.steering import Imitation, Memory, Moment, Steered
+from hoz_dist.policy.state import Decision, State, Unrolled
+from hoz_dist.policy.steering import Memory, Moment, Steered
 from hoz_dist.policy.steerings import STEERINGS
 from hoz_dist.policy.tape import Tape
 from hoz_dist.policy.trunks import make_trunk
-
-
-class State(NamedTuple):
-    """Recurrent state of B episodes."""
-
-    lstm: Tensor
-    """[2, layers, B, cells]."""
-    zone: ZoneState
-    """Local copy of the scene graph; empty without the zone layer."""
-    memory: Memory = ()
-    """What the steering remembers of the episodes; empty without one."""
-    target_seen: Tensor = torch.empty(0, dtype=torch.bool)
-    """Whether the target has been seen in the episode, bool [B]; decides what is taught, and is no input."""
-
-    def select(self, episodes: Tensor) -> "State":
-        """Return the state of some of the episodes, by their indices."""
-        return State(
-            lstm=self.lstm[:, :, episodes],
-            zone=ZoneState(*(part[episodes] for part in self.zone)),
-            memory=tuple(part[episodes] for part in self.memory),
-            target_seen=self.target_seen[episodes],
-        )
-
-
-class Decision(NamedTuple):
-    """What the network says at one step."""
-
-    logits: Tensor
-    """[B, 6]."""
-    value: Tensor
-    """[B]."""
-    state: State
-    """State after the step."""
-    guidance: Guidance
-    """Scene, zone and sub-goal in use, to be recorded for `ActorCritic.unroll`."""
-
-
-class Unrolled(NamedTuple):
-    """What the network says over a rollout."""
-
-    logits: Tensor
-    """[T, B, 6]."""
-    values: Tensor
-    """[T, B]."""
-    scene_logits: Tensor | None
-    """[T, B, S], or None without the scene layer."""
-    state: State
-    """State after the rollout's last step, without gradient."""
-    imitation: Imitation | None
-    """What else is to be taught the expert's action, if anything is."""
-    target_seen: Tensor
-    """Whether the target has been seen in the episode, bool [T, B]."""
-
-
-class _Inputs(NamedTuple):
-    """An observation as tensors with time and batch flattened."""
-
-    features: Tensor
-    detections: Tensor
-    appearance: Tensor
-    target: Tensor
-    previous_action: Tensor
-
-    @classmethod
-    def of(cls, observation: Observation) -> "_Inputs":
-        def flat(values: Tensor) -> Tensor:
-            return values.reshape(-1, *values.shape[observation.target.ndim :])
-
-        return cls(
-            features=flat(torch.from_numpy(observation.features)),
-            detections=flat(torch.from_numpy(observation.detections)),
-            appearance=flat(torch.from_numpy(observation.appearance)),
-            target=functional.one_hot(flat(torch.from_numpy(observation.target)), len(TARGETS)).float(),
-            previous_action=flat(torch.from_numpy(observation.previous_action)),
-        )
-
-    @property
-    def confidence(self) -> Tensor:
-        """f^s, [B, N]."""
-        return self.detections[..., 4]
-
-    @property
-    def bag(self) -> Tensor:
-        """f, the bag of objects seen, [B, N]."""
-        return (self.confidence > 0).float()
-
-    @property
-    def sees_target(self) -> Tensor:
-        """Whether the target is seen, bool [B]."""
-        return (self.confidence * self.target).sum(dim=-1) > 0
 
 
 class ActorCritic(nn.Module):
@@ -130,7 +40,7 @@ class ActorCritic(nn.Module):
         sizes, categories = settings.sizes, len(TARGETS)
         branch = next((BRANCHES[layer] for layer in settings.layers if layer in BRANCHES), None)
         shape = () if branch is None else branch.shape(settings)
-        maps = (shape[0], shape[1]) if len(shape) == _MAPS else None
+        maps = (shape[0], shape[1]) if len(shape) == MAP_AXES else None
         context = sizes.target + sizes.action
         context += sizes.zones * settings.zone_layer + settings.scenes * settings.scene_layer
         context += sum(shape) if maps is None else 0
@@ -184,7 +94,7 @@ class ActorCritic(nn.Module):
         """
         # For one step, copying the weights in a lower precision would cost more than it saves.
         tape = tape or self.lstm.tape(1, len(observation.first))
-        inputs = _Inputs.of(observation)
+        inputs = Inputs.of(observation)
         first = torch.from_numpy(observation.first)
         with _products_in(tape.dtype):
             picture = self.trunk.see(inputs.features)
@@ -200,7 +110,7 @@ class ActorCritic(nn.Module):
         logits, value = self._heads(outputs, inputs)
         memory = state.memory
         if self.steering is not None:
-            steered = self._steer(logits, outputs, picture, inputs, first.unsqueeze(0), memory)
+            steered = self._steer(logits, outputs, inputs, first.unsqueeze(0), memory)
             logits, memory = steered.logits.squeeze(0), steered.memory
         target_seen = inputs.sees_target | (state.target_seen & ~first)
         return Decision(logits, value, State(tape.state, zone, memory, target_seen), guidance)
@@ -220,7 +130,7 @@ class ActorCritic(nn.Module):
         """
         steps, batch = observation.target.shape
         tape = self.tape(steps, batch) if tape is None else tape
-        inputs = _Inputs.of(observation)
+        inputs = Inputs.of(observation)
         first = torch.from_numpy(observation.first)
         with _products_in(tape.dtype):
             picture = self.trunk.see(inputs.features)
@@ -239,7 +149,7 @@ class ActorCritic(nn.Module):
         logits, values = self._heads(outputs.flatten(0, 1), inputs)
         steered = Steered(logits.view(steps, batch, -1), state.memory)
         if self.steering is not None:
-            steered = self._steer(logits, outputs, picture, inputs, first, state.memory)
+            steered = self._steer(logits, outputs, inputs, first, state.memory)
         target_seen = _ever(inputs.sees_target.view(steps, batch), first, state.target_seen)
         return Unrolled(
             logits=steered.logits,
@@ -250,7 +160,7 @@ class ActorCritic(nn.Module):
             target_seen=target_seen,
         )
 
-    def _scene_logits(self, picture: Tensor, inputs: _Inputs) -> Tensor | None:
+    def _scene_logits(self, picture: Tensor, inputs: Inputs) -> Tensor | None:
         if self.scene_layer is None:
             return None
         return self.scene_layer(self.trunk.summary(picture), inputs.confidence)  # type: ignore[no-any-return]
@@ -271,7 +181,7 @@ class ActorCritic(nn.Module):
 
     def _join(
         self,
-        inputs: _Inputs,
+        inputs: Inputs,
         picture: Tensor,
         scene_logits: Tensor | None,
         zone_embedding: Tensor | None,
@@ -286,22 +196,20 @@ class ActorCritic(nn.Module):
         objects = None
         if self.object_branch is not None:
             seen = self.object_branch(inputs.detections, inputs.appearance, inputs.target)
-            if seen.ndim == 1 + _MAPS:
+            if seen.ndim == 1 + MAP_AXES:
                 objects = seen
             else:
                 context.append(seen)
         with _products_in(dtype):
             return self.trunk(picture, objects, torch.cat(context, dim=1))  # type: ignore[no-any-return]
 
-    def _heads(self, outputs: Tensor, inputs: _Inputs) -> tuple[Tensor, Tensor]:
+    def _heads(self, outputs: Tensor, inputs: Inputs) -> tuple[Tensor, Tensor]:
         logits = self.actor(outputs)
         if self.done_reminder is not None:
             logits = self.done_reminder(logits, inputs.confidence, inputs.target)
         return logits, self.critic(outputs).squeeze(-1)
 
-    def _steer(
-        self, logits: Tensor, outputs: Tensor, picture: Tensor, inputs: _Inputs, first: Tensor, memory: Memory
-    ) -> Steered:
+    def _steer(self, logits: Tensor, outputs: Tensor, inputs: Inputs, first: Tensor, memory: Memory) -> Steered:
         """Let the steering have its say about all steps, [T, B]; its inputs may be flattened."""
 
         def over_time(values: Tensor) -> Tensor:
@@ -311,17 +219,10 @@ class ActorCritic(nn.Module):
             logits=over_time(logits),
             outputs=outputs.view(*first.shape, -1),
             features=over_time(inputs.features),
-            picture=over_time(self.trunk.summary(picture).float()),
-            detections=over_time(inputs.detections),
-            target=over_time(inputs.target),
             previous_action=over_time(inputs.previous_action),
             first=first,
         )
         return self.steering(moment, memory, self.actor)  # type: ignore[no-any-return, misc]
-
-
-_MAPS: Final = 2
-"""Axes of an object branch's maps of one picture; a vector has one."""
 
 
 def _ever(now: Tensor, first: Tensor, before: Tensor) -> Tensor:

@@ -27,6 +27,9 @@ from hoz_dist.policy.layers_sp import PriorLayer
 from hoz_dist.policy.methods.description import Layer
 from hoz_dist.policy.settings import PolicySettings
 
+MAP_AXES: Final = 2
+"""Axes of the maps of one picture; a vector has one."""
+
 
 class Branch(NamedTuple):
     """How to make an object branch."""

@@ -1,4 +1,7 @@
-"""Fast weights of the actor's head: an increment dW of its weights for each episode, logits = (W + dW) h + b.
+"""Fast weights of the actor's head: an increment dW of its weights for each episode adds dW h to the logits.
+
+Without a done reminder the logits are then (W + dW) h + b. Where there is one, which is in `hoz-tpn` alone, dW h is
+added after it: Done's logit is beta p' f^s (w h + b) + dw h, and so not exactly 0 while the target is not seen.
 
 Methods that adapt within an episode (`savn`, and those with TPN) adapt the head alone, where their papers adapt all of
 the network. Each of B episodes needs adapted weights of its own: copies of all weights would cost B times the memory,

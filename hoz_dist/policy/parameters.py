@@ -11,6 +11,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
+from hoz_dist.errors import InvalidValueError
 from hoz_dist.policy.actor_critic import ActorCritic
 from hoz_dist.policy.settings import PolicySettings
 
@@ -65,6 +66,24 @@ class FlatParameters:
             message = f"expected {tuple(self.values.shape)} parameters, got {vector.shape}"
             raise ValueError(message)
         self.values.numpy()[:] = vector
+
+
+def check_fit(checkpoint: int, network: int) -> None:
+    """Look whether a checkpoint's parameters can be those of the network that this version makes of its configuration.
+
+    Args:
+        checkpoint: Number of parameters of the checkpoint.
+        network: Number of parameters of the network.
+
+    Raises:
+        InvalidValueError: They cannot.
+    """
+    if checkpoint != network:
+        message = (
+            f"The checkpoint has {checkpoint} parameters, the network of its configuration {network}: it may be of an "
+            "older version of hoz-dist; use the version that made it, or train anew."
+        )
+        raise InvalidValueError(message)
 
 
 def make_policy(settings: PolicySettings, seed: int) -> ActorCritic:

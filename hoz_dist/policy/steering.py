@@ -38,12 +38,6 @@ class Moment(NamedTuple):
     """Of the LSTM, [T, B, H]; the actor's inputs."""
     features: Tensor
     """Of the picture as the visual encoder gives them, which has no parameters that are trained, [T, B, C, G, G]."""
-    picture: Tensor
-    """Summary of the picture's features as the trunk sees them, [T, B, F]."""
-    detections: Tensor
-    """Boxes and confidences, [T, B, N, 5]."""
-    target: Tensor
-    """One-hot target indicator, [T, B, N]."""
     previous_action: Tensor
     """As it was `hoz_dist.nav.feedback.felt`, int64 [T, B]; ``NO_ACTION`` at the first step of an episode."""
     first: Tensor

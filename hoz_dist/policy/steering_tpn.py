@@ -16,6 +16,7 @@ We had the paper's abstract and its authors' code, ECCV-VN, to go by. Deviations
 - Only the head adapts; see `hoz_dist.policy.fast_weights` for why. It keeps what it learnt until the episode ends; the
   code forgets it after every 50 steps.
 - It adapts before it acts, so that the pseudo-label counts where it was made; in the code it counts from the next step.
+- With the done reminder of HOZ, what the head has adapted by is added after it; see `hoz_dist.policy.fast_weights`.
 - The pseudo-label is TPN's distribution; the code takes its likeliest action, which would have a TPN that knows nothing
   yet drive an agent always the same way.
 - The policy learns together with TPN, and with the adaptation; the code trains the policy first, then TPN, and adapts

@@ -88,7 +88,10 @@ class ObjectNavEnv(gymnasium.Env[dict[str, Any], np.int64]):
     | `depth`           | `Box` float32 (S, S)       | Metres along the viewing axis, 0 to 20                          |
     | `detections`      | `Box` float32 (22, 5)      | Box (x0, y0, x1, y1) over S and confidence of each category     |
     | `target`          | `Discrete(22)`             | Index of the target in `hoz_dist.nav.categories.TARGETS`        |
-    | `previous_action` | `Discrete(7)`              | The last action; 6 at the start                                 |
+    | `previous_action` | `Discrete(9)`              | The last action; 6 at the start, 7 and 8 if it failed           |
+
+    A previous action of 7 is a MoveAhead, one of 8 a LookUp or LookDown, that left the agent or the camera where it was
+    (`hoz_dist.nav.feedback`).
 
     ## Rewards
 
@@ -102,7 +105,7 @@ class ObjectNavEnv(gymnasium.Env[dict[str, Any], np.int64]):
     ## Episode End
 
     1. Termination: Done.
-    2. Truncation: `max_actions` actions (by default 100, in living rooms 200) without Done.
+    2. Truncation: `max_actions` actions (by default 100, in living rooms 200, in apartments 500) without Done.
 
     The environment does not reset itself (`metadata["autoreset_mode"]` is `DISABLED`); Gymnasium's vector environments
     do so as they declare. `hoz_dist.sim.batch_env.BatchEnv` is the fast way to run many episodes.

@@ -14,8 +14,9 @@ from gymnasium.vector import AutoresetMode
 
 from hoz_dist.errors import HozError
 from hoz_dist.nav.actions import NO_ACTION, Action
-from hoz_dist.nav.categories import TARGETS
-from hoz_dist.nav.feedback import FAILED_LOOK, FAILED_MOVE
+from hoz_dist.nav.categories import SCENES, TARGETS
+from hoz_dist.nav.episode import evaluation_cap
+from hoz_dist.nav.feedback import FAILED_LOOK, FAILED_MOVE, PREVIOUS_ACTIONS
 from hoz_dist.nav.rooms import RoomId
 from hoz_dist.sim.gym_env import NoFeatures, ObjectNavEnv
 from hoz_dist.sim.registration import ENVIRONMENT_ID, register
@@ -55,6 +56,14 @@ def test_the_declared_entry_point_registers_it() -> None:
         pytest.skip("hoz-dist is not installed, only importable")
     declared["hoz_dist"].load()()
     assert ENVIRONMENT_ID in gymnasium.registry
+
+
+def test_the_description_has_the_spaces_and_caps_of_the_code() -> None:
+    described = ObjectNavEnv.__doc__ or ""
+    assert f"| `previous_action` | `Discrete({PREVIOUS_ACTIONS})`" in described
+    for scene in SCENES:
+        named = f"in {scene.replace('_', ' ')}s" if evaluation_cap(scene) != evaluation_cap("kitchen") else "by default"
+        assert f"{named} {evaluation_cap(scene)}" in described
 
 
 def test_an_oracle_is_rewarded_as_the_protocol_says(cache: Path) -> None:

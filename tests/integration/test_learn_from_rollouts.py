@@ -30,6 +30,7 @@ def test_what_was_acknowledged_counts_once_though_the_learner_was_killed_and_goe
                 status = status_when(client, lambda status: status["version"] > 3 and status["episodes"] > 0)
             assert status["rejected"] == {}
             assert status["losses"]["entropy"] > 0.5
+            assert status["losses"]["approach_loss"] > 0.0
             assert status["lag"]["mean"] == pytest.approx(1.0, abs=0.5), "the next rollout is acted meanwhile"
             wait_for_checkpoint(run, version=3)
             learner.kill()

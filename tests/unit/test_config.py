@@ -47,26 +47,12 @@ def test_what_is_no_configuration_is_refused(values: object) -> None:
         RunConfig.from_json(values)
 
 
-def test_a_run_from_before_there_was_a_choice_is_what_was_done_then() -> None:
-    values = RunConfig(preset="paper", seed=3).to_json()
-    for later in (
-        "precision",
-        "learn_from",
-        "compress",
-        "parameters",
-        "subgoal",
-        "clustering",
-        "merge_order",
-        "graph_source",
-        "imitation_weight",
-        "approach_weight",
-        "approach_frames",
-        "relations",
-    ):
-        del values[later]
-    assert RunConfig.from_json(values) == RunConfig(preset="paper", seed=3, approach_weight=0.0)
-    del values["method"]
-    with pytest.raises(HozError, match="missing or unknown: method"):
+def test_a_configuration_of_an_older_version_is_refused_as_such() -> None:
+    """Runs from before the approach was taught have other networks, so nothing could go on from them."""
+    values = RunConfig().to_json()
+    del values["approach_weight"], values["approach_frames"]
+    complaint = r"not of this version .*unknown: approach_frames, approach_weight\); use the version that made it"
+    with pytest.raises(InvalidValueError, match=complaint):
         RunConfig.from_json(values)
 
 

@@ -72,6 +72,9 @@ class EpisodesPush(Push):
         value_loss: Mean value loss, likewise.
         entropy: Mean entropy of the policy, nats, likewise.
         scene_loss: Mean cross-entropy of the scene layer, nats, likewise; 0 without the layer.
+        imitation_loss: Mean cross-entropy with what a steering has imitated, nats, likewise; None if nothing is.
+        approach_loss: Mean cross-entropy with the actions that begin a shortest path, where the target was seen, nats,
+            likewise; None if the approach is not taught.
     """
 
     KIND: ClassVar[str] = "episodes"
@@ -83,6 +86,8 @@ class EpisodesPush(Push):
     value_loss: Annotated[float, Real()] = 0.0
     entropy: Annotated[float, Real()] = 0.0
     scene_loss: Annotated[float, Real()] = 0.0
+    imitation_loss: Annotated[float | None, Real()] = None
+    approach_loss: Annotated[float | None, Real()] = None
 
     def __post_init__(self) -> None:
         super().__post_init__()

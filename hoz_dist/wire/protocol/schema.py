@@ -317,22 +317,29 @@ class Structure:
 
     Attributes:
         SPECS: The spec of each field.
+        OPTIONAL: Fields whose default is None, which on the wire is a field that is left out: so peers that do not know
+            a field yet are understood.
     """
 
     SPECS: ClassVar[dict[str, Spec]] = {}
+    OPTIONAL: ClassVar[frozenset[str]] = frozenset()
 
     def __init_subclass__(cls) -> None:
         """Gather the specs of the fields, inherited ones first."""
         hints = get_type_hints(cls, include_extras=True)
         cls.SPECS = {name: get_args(hint)[1] for name, hint in hints.items() if get_origin(hint) is Annotated}
+        cls.OPTIONAL = frozenset(name for name in cls.SPECS if getattr(cls, name, ...) is None)
 
     def __post_init__(self) -> None:
-        for name, spec in self.SPECS.items():
-            spec.check(getattr(self, name), name)
+        for name in self._filled():
+            self.SPECS[name].check(getattr(self, name), name)
+
+    def _filled(self) -> list[str]:
+        return [name for name in self.SPECS if name not in self.OPTIONAL or getattr(self, name) is not None]
 
     def pack(self) -> dict[str, object]:
         """Return the map of the packed fields."""
-        return {name: spec.pack(getattr(self, name)) for name, spec in self.SPECS.items()}
+        return {name: self.SPECS[name].pack(getattr(self, name)) for name in self._filled()}
 
     @classmethod
     def unpack(cls, raw: object, where: str) -> "Structure":
@@ -341,15 +348,20 @@ class Structure:
         Raises:
             RejectedError: Anything is not as it should be.
         """
-        fields = map_of(raw, cls.SPECS.keys(), where)
-        return cls(**{name: spec.unpack(fields[name], name) for name, spec in cls.SPECS.items()})
+        fields = map_of(raw, cls.SPECS.keys() - cls.OPTIONAL, where, cls.OPTIONAL)
+        values = {name: spec.unpack(fields[name], name) for name, spec in cls.SPECS.items() if name in fields}
+        for name in cls.OPTIONAL & values.keys():
+            cls.SPECS[name].check(values[name], name)  # a None that is there was not left out
+        return cls(**values)
 
 
-def map_of(raw: object, names: AbstractSet[str], where: str) -> dict[str, Any]:
-    """Return a map that has exactly those names."""
+def map_of(
+    raw: object, names: AbstractSet[str], where: str, optional: AbstractSet[str] = frozenset()
+) -> dict[str, Any]:
+    """Return a map that has exactly those names, and perhaps optional ones."""
     if type(raw) is not dict:
         raise wrong_type(where, "a map", raw)
-    missing, unknown = names - raw.keys(), raw.keys() - names
+    missing, unknown = names - raw.keys(), raw.keys() - names - optional
     if missing or unknown:
         told = [f"missing {', '.join(sorted(missing))}"] if missing else []
         told += [f"unknown {', '.join(sorted(map(shown, unknown)))[:200]}"] if unknown else []

@@ -13,11 +13,11 @@ from hoz_dist.a3c.loss import Loss, a3c_loss
 from hoz_dist.a3c.rollout import Rollout
 from hoz_dist.config import RunConfig
 from hoz_dist.nav.observation import Observation
-from hoz_dist.policy.actor_critic import State
 from hoz_dist.policy.graph_bank import GraphBank
 from hoz_dist.policy.methods.description import Method
 from hoz_dist.policy.navigator import Guidance
 from hoz_dist.policy.parameters import FlatParameters, make_policy
+from hoz_dist.policy.state import State
 from tests.unit.a3c.making import make_rollout
 from tests.unit.policy.making import make_observation, make_scene_graph, step_of
 

@@ -5,7 +5,7 @@ import pytest
 import torch
 from torch.nn import functional
 
-from hoz_dist.a3c.loss import LossWeights, a3c_loss
+from hoz_dist.a3c.loss import LossWeights, a3c_loss, mean_terms
 from hoz_dist.a3c.rollout import Rollout
 from hoz_dist.policy.steering import Imitation
 from tests.unit.a3c.making import make_rollout
@@ -77,7 +77,7 @@ def test_imitation_moves_what_counts_to_the_experts_action_and_nothing_else() ->
     arguments = (replace(rollout, expert=expert), torch.zeros(2, 4, 6), torch.zeros(2, 4))
     loss = a3c_loss(*arguments, WEIGHTS._replace(imitation=2.0), imitation=Imitation(imitated, counts))
     loss.total.backward()  # type: ignore[no-untyped-call]
-    assert math.isclose(loss.imitation, 2 * 5 * math.log(6) / 7, rel_tol=1e-5)
+    assert loss.imitation == pytest.approx(2 * 5 * math.log(6) / 7, rel=1e-5)
     assert imitated.grad is not None
     assert imitated.grad[0, 1:].abs().max() == 0.0
     for t, b in ((0, 0), (1, 0), (1, 1), (1, 2), (1, 3)):
@@ -89,7 +89,7 @@ def test_without_the_experts_actions_nothing_is_imitated() -> None:
     rollout = make_rollout(steps=2, batch=4, seed=5)
     imitation = Imitation(torch.zeros(2, 4, 1, 6, requires_grad=True), torch.ones(2, 4, dtype=torch.bool))
     arguments = (rollout, torch.zeros(2, 4, 6), torch.zeros(2, 4), WEIGHTS._replace(imitation=1.0))
-    assert a3c_loss(*arguments, imitation=imitation).imitation == 0.0
+    assert a3c_loss(*arguments, imitation=imitation).imitation is None
 
 
 def approaching() -> tuple[Rollout, torch.Tensor]:
@@ -134,8 +134,28 @@ def test_the_approach_is_the_surprise_at_doing_any_of_what_the_expert_might() ->
     arguments = (rollout, torch.zeros(2, 4, 6), torch.zeros(2, 4))
     loss = a3c_loss(*arguments, WEIGHTS._replace(approach=0.5), target_seen=target_seen)
     without = a3c_loss(*arguments, WEIGHTS)
-    assert loss.approach == pytest.approx((math.log(6 / 2) + math.log(6)) / 7, rel=1e-5)
-    assert loss.total.item() == pytest.approx(without.total.item() + 0.5 * loss.approach, rel=1e-5)
+    approach = (math.log(6 / 2) + math.log(6)) / 7
+    assert loss.approach == pytest.approx(approach, rel=1e-5)
+    assert loss.total.item() == pytest.approx(without.total.item() + 0.5 * approach, rel=1e-5)
+
+
+def test_what_is_taught_is_reported_and_what_is_not_is_left_out() -> None:
+    """A term that was 0 where its weight is would look as if it had been learnt."""
+    rollout, target_seen = approaching()
+    arguments = (rollout, torch.zeros(2, 4, 6), torch.zeros(2, 4))
+    untaught = a3c_loss(*arguments, WEIGHTS, target_seen=target_seen).terms()
+    assert set(untaught) == {"policy_loss", "value_loss", "entropy", "scene_loss"}
+    taught = a3c_loss(*arguments, WEIGHTS._replace(approach=0.5), target_seen=target_seen)
+    assert taught.terms() == untaught | {"approach_loss": taught.approach}
+    imitation = Imitation(torch.zeros(2, 4, 1, 6), torch.ones(2, 4, dtype=torch.bool))
+    imitating = a3c_loss(*arguments, WEIGHTS, imitation=imitation)
+    assert imitating.terms() == untaught | {"imitation_loss": imitating.imitation}
+
+
+def test_means_of_terms_are_over_the_losses_that_have_them() -> None:
+    losses = [{"entropy": 1.0, "approach_loss": 0.5}, {"entropy": 2.0}, {"entropy": 6.0, "approach_loss": 0.25}]
+    assert mean_terms(losses) == {"entropy": 3.0, "approach_loss": 0.375}
+    assert mean_terms([]) == {}
 
 
 def test_without_weight_labels_or_sight_the_loss_is_what_it_was() -> None:

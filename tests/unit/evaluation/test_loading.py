@@ -2,14 +2,15 @@ import numpy as np
 import pytest
 
 from hoz_dist.config import RunConfig
-from hoz_dist.errors import DamagedFileError, InvalidValueError, NotFoundError
+from hoz_dist.errors import InvalidValueError, NotFoundError
 from hoz_dist.evaluation.loading import load_agent, matching_encoder
 from hoz_dist.policy.parameters import initial_parameters
 
 
 @pytest.mark.parametrize("parameters", [10, 208_721], ids=["none", "of an agent that did not feel what failed"])
 def test_parameters_of_another_network_are_refused(parameters: int) -> None:
-    with pytest.raises(DamagedFileError, match=r"do not fit its configuration .*; use another checkpoint\."):
+    complaint = rf"has {parameters} parameters, .* 208737: it may be of an older version of hoz-dist; use the"
+    with pytest.raises(InvalidValueError, match=complaint):
         load_agent(RunConfig(), np.zeros(parameters, dtype=np.float32), {})
 
 

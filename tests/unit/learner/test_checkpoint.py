@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from safetensors.numpy import load_file, save_file
 
+from hoz_dist.config import RunConfig
 from hoz_dist.errors import DamagedFileError, InvalidValueError, NotFoundError
 from learner.checkpoint import (
     FOLDER,
@@ -25,7 +26,18 @@ from learner.core import LearnerCore
 from learner.events import EpisodesReceived, RoomGraphReceived
 from learner.leadership import DeposedError
 from tests.unit.learner.disk import PASSING, full_disk, unreadable
-from tests.unit.learner.making import CONFIG, answer, episodes, gradient, leading, push, room_graph, room_push, vector
+from tests.unit.learner.making import (
+    CONFIG,
+    SIZE,
+    answer,
+    episodes,
+    gradient,
+    leading,
+    push,
+    room_graph,
+    room_push,
+    vector,
+)
 
 
 @pytest.fixture
@@ -208,6 +220,27 @@ def test_another_format_is_refused_by_name(
         path = save_checkpoint(tmp_path, checkpoint)
     with pytest.raises(InvalidValueError, match="format 2; this version of hoz-dist reads format 1"):
         load_checkpoint(path)
+
+
+def test_one_of_an_older_hoz_dist_is_refused_by_name_and_not_passed_over(
+    tmp_path: Path, checkpoint: Checkpoint, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Which does not make it a damaged one, for which an earlier checkpoint could stand in."""
+    save_checkpoint(tmp_path, with_version(checkpoint, 1))
+    values = checkpoint.config.to_json()
+    del values["approach_weight"]
+    with monkeypatch.context() as older:
+        older.setattr(RunConfig, "to_json", lambda _: values)
+        path = save_checkpoint(tmp_path, with_version(checkpoint, 2))
+    for place in (path, tmp_path):
+        with pytest.raises(InvalidValueError, match=rf"'{path}' cannot be used: .* not of this version of hoz-dist"):
+            load_checkpoint(place)
+
+
+def test_one_of_another_network_is_not_gone_on_from(checkpoint: Checkpoint) -> None:
+    complaint = f"has {SIZE} parameters, .* {SIZE + 2}: it may be of an older version of hoz-dist"
+    with pytest.raises(InvalidValueError, match=complaint):
+        LearnerCore(CONFIG, vector(0, SIZE + 2), checkpoint=checkpoint)
 
 
 def test_a_missing_file_and_a_folder_without_checkpoints_are_told_apart_from_damage(tmp_path: Path) -> None:

@@ -234,7 +234,9 @@ def test_losses_are_means_over_rollouts(monkeypatch: pytest.MonkeyPatch) -> None
     for sequence in range(3):
         answer(core, TrajectoryReceived(0, rollout(actor, sequence)))
     assert len({learnt.loss.policy for learnt in found}) == 3
-    assert core.statistics.losses["policy_loss"] == pytest.approx(np.mean([learnt.loss.policy for learnt in found]))
+    for name in ("policy_loss", "approach_loss"):
+        mean = np.mean([learnt.loss.terms()[name] for learnt in found])
+        assert core.statistics.losses[name] == pytest.approx(mean)
 
 
 def test_losses_are_those_that_were_computed_here() -> None:

@@ -130,7 +130,8 @@ def test_scalars_are_logged_over_frames(tmp_path: Path) -> None:
     core = LearnerCore(replace(CONFIG, frames=100), vector(0))
     scalars = ScalarRecorder(tmp_path, core.statistics.frames)
     scalars.record(core.status(0.0))
-    answer(core, EpisodesReceived(0, episodes(0, ("kitchen/1", True), ("bathroom/1", False))))
+    told = episodes(0, ("kitchen/1", True), ("bathroom/1", False))
+    answer(core, EpisodesReceived(0, replace(told, entropy=1.5, approach_loss=0.75)))
     push(core, *(gradient(sequence, version=0) for sequence in range(3)))
     scalars.record(core.status(1.0))
     scalars.close()
@@ -148,3 +149,6 @@ def test_scalars_are_logged_over_frames(tmp_path: Path) -> None:
     assert last("train/version_diff_max") == (30, 2.0)
     assert last("train/learning_rate")[1] == pytest.approx(0.008)
     assert last("perf/_fps") == (30, 30.0)
+    assert last("loss/entropy") == (30, 1.5)
+    assert last("loss/approach_loss") == (30, 0.75)
+    assert "loss/imitation_loss" not in events.Tags()["scalars"], "nothing is imitated"

@@ -1,7 +1,7 @@
 import torch
 
-from hoz_dist.policy.actor_critic import State
 from hoz_dist.policy.navigator import initial_zone_state
+from hoz_dist.policy.state import State
 from learner.rollout_states import Ended, RolloutStates
 from tests.wire_samples import gradient_push
 

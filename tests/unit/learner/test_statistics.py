@@ -1,10 +1,15 @@
+from dataclasses import replace
+
 import pytest
 
 from hoz_dist.nav.episode import EpisodeResult
 from hoz_dist.nav.rooms import RoomId
 from hoz_dist.wire.protocol.pushes import EpisodesPush
 from hoz_dist.wire.protocol.rejection import RejectedError
+from learner.core import LearnerCore
+from learner.events import EpisodesReceived
 from learner.statistics import MAX_ACTORS, SUCCESS_WINDOW, LagSummary, Rate, Statistics
+from tests.unit.learner.making import CONFIG, answer, episodes, vector
 
 
 def test_a_steady_rate_is_measured() -> None:
@@ -85,3 +90,13 @@ def test_the_speed_of_a_process_is_not_that_of_its_predecessor() -> None:
     successor = statistics.actors["a", 8].summary(now=3.0)
     assert (successor["frames"], successor["frames_per_second"], successor["lag"]) == (60, 60.0, 0.0)
     assert statistics.frames == 3060
+
+
+def test_the_status_has_the_losses_that_an_actor_told_of() -> None:
+    core = LearnerCore(CONFIG, vector(0))
+    assert core.status(0.0)["losses"] == {}
+    told = {"policy_loss": -0.5, "value_loss": 0.25, "entropy": 1.5, "scene_loss": 0.0, "approach_loss": 0.75}
+    answer(core, EpisodesReceived(0, replace(episodes(0), **told)))  # type: ignore[arg-type]
+    assert core.status(0.0)["losses"] == told
+    answer(core, EpisodesReceived(0, replace(episodes(1), imitation_loss=0.125)))
+    assert set(core.status(0.0)["losses"]) == {"policy_loss", "value_loss", "entropy", "scene_loss", "imitation_loss"}

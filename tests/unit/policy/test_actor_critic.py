@@ -6,13 +6,14 @@ import torch
 
 from hoz_dist.config import RunConfig
 from hoz_dist.nav.observation import Observation
-from hoz_dist.policy.actor_critic import ActorCritic, Decision, State
+from hoz_dist.policy.actor_critic import ActorCritic
 from hoz_dist.policy.graph_bank import GraphBank
 from hoz_dist.policy.methods import METHODS
 from hoz_dist.policy.methods.description import Layer, Method
 from hoz_dist.policy.navigator import Guidance
 from hoz_dist.policy.parameters import FlatParameters, initial_parameters, make_policy
 from hoz_dist.policy.settings import Precision, Preset
+from hoz_dist.policy.state import Decision, State
 from hoz_dist.policy.tape import dtype_of
 from tests.unit.policy.making import make_observation, make_scene_graph, step_of
 

@@ -4,10 +4,10 @@ import pytest
 import torch
 
 from hoz_dist.config import RunConfig
-from hoz_dist.policy.actor_critic import State
 from hoz_dist.policy.graph_bank import GraphBank
 from hoz_dist.policy.navigator import Guidance
 from hoz_dist.policy.parameters import FlatParameters, make_policy
+from hoz_dist.policy.state import State
 from tests.unit.policy.making import make_observation, step_of
 from tests.unit.policy.steering import CountingSteering, steer_a3c
 

@@ -26,7 +26,7 @@ def make_moment(first: Tensor) -> Moment:
     """Make outputs, with logits that the head of `make_head` makes of them; the rest is not looked at."""
     outputs = torch.randn(*first.shape, H, generator=torch.Generator().manual_seed(1)).tanh()
     nothing = torch.zeros(*first.shape, 1)
-    return Moment(make_head()(outputs).detach(), outputs, nothing, nothing, nothing, nothing, nothing, first)
+    return Moment(make_head()(outputs).detach(), outputs, nothing, nothing, first)
 
 
 def make_head() -> nn.Linear:

@@ -33,8 +33,7 @@ def make_moment(views: list[list[int]], first: list[list[bool]]) -> Moment:
     outputs = torch.randn(*numbers.shape, H, generator=generator).tanh()
     logits = torch.randn(*numbers.shape, 6, generator=generator)
     actions = torch.randint(6, numbers.shape, generator=generator).masked_fill(begins, 6)
-    nothing = torch.zeros(*numbers.shape, 1)
-    return Moment(logits, outputs, pictures[numbers], nothing, nothing, nothing, actions, begins)
+    return Moment(logits, outputs, pictures[numbers], actions, begins)
 
 
 def run(steering: TentativePolicy, moment: Moment, cuts: tuple[int, ...]) -> tuple[Tensor, Tensor, Tensor]:

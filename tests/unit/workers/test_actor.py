@@ -19,7 +19,7 @@ from workers import actor as module
 from workers.actor import REPORT_EPISODES, REPORT_ROLLOUTS, Actor
 from workers.collector import Update
 
-LOSS = Loss(torch.zeros(()), policy=2.0, value=4.0, entropy=6.0, scene=8.0)
+LOSS = Loss(torch.zeros(()), policy=2.0, value=4.0, entropy=6.0, scene=8.0, approach=0.5)
 STALE = Refused(Reason.STALE, "too old", 1)
 FINITE = np.zeros(3, np.float32)
 NOT_FINITE = np.array([0.0, np.nan, 0.0], np.float32)
@@ -96,7 +96,7 @@ def reports(
 
 
 def test_losses_are_means_over_the_accepted_gradients(monkeypatch: pytest.MonkeyPatch) -> None:
-    losses = {"policy_loss": 2.0, "value_loss": 4.0, "entropy": 6.0, "scene_loss": 8.0}
+    losses = {"policy_loss": 2.0, "value_loss": 4.0, "entropy": 6.0, "scene_loss": 8.0, "approach_loss": 0.5}
     found = reports(monkeypatch, Accepted(1, 1), 2 * REPORT_ROLLOUTS)
     assert found == [(3 * REPORT_ROLLOUTS, losses)] * 2
 
