@@ -184,7 +184,7 @@ def plot_command(
     from hoz_dist.atomic import check_writable, write_atomically
     from hoz_dist.errors import InvalidValueError
     from hoz_dist.graph.files import load_graph
-    from hoz_dist.graph.matching import current_zone
+    from hoz_dist.graph.update import current_zone
     from hoz_dist.nav.categories import TARGETS
     from hoz_dist.nav.rooms import RoomId
     from hoz_dist.viz.zones import png, room_figure, scene_graph_figure

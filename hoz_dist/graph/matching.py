@@ -1,4 +1,4 @@
-"""Distance between zones: the matching of two graphs' zones [4.1.2], and the zone that fits what is seen [4.2]."""
+"""Distance between zones, and the matching of the zones of two graphs [4.1.2]."""
 
 from typing import Final
 
@@ -7,14 +7,10 @@ from numpy.typing import NDArray
 
 ALPHA: Final = 0.1
 """Keeps the distance of zones with nothing in common finite [Eq. 3]."""
-Bag = NDArray[np.floating] | NDArray[np.bool_]
-"""What is seen, [..., N]: 0 or 1, or a confidence in between."""
 
 
 def distance(a: NDArray[np.floating], b: NDArray[np.floating]) -> NDArray[np.float64]:
     """Compute d(a, b) = ||a - b||_2 + 1 / (a.b + alpha) [Eq. 3], which is always positive.
-
-    In NumPy, as clients that plan have no learning library; `hoz_dist.policy.navigator` has it for agents.
 
     Args:
         a: Zone nodes or bags of objects, [..., N], not negative.
@@ -43,16 +39,3 @@ def match(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.int64]:
     weights = 1.0 / distance(a[:, None], b[None])  # [K, K]
     _, matched = linear_sum_assignment(weights, maximize=True)
     return matched.astype(np.int64)
-
-
-def current_zone(nodes: NDArray[np.floating], bag: Bag) -> NDArray[np.int64]:
-    """Find the zone that is closest to what is seen, argmin_k d(f_t, delta_k) [4.2, Eq. 3].
-
-    Args:
-        nodes: delta, zone nodes, [..., K, N].
-        bag: f_t, what is seen, [..., N].
-
-    Returns:
-        Zone, int64 [...]; the first one of equals.
-    """
-    return np.asarray(distance(nodes, np.asarray(bag, dtype=np.float64)[..., None, :]).argmin(axis=-1), dtype=np.int64)

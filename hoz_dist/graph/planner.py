@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hoz_dist.errors import InvalidValueError, UnknownNameError
-from hoz_dist.graph.matching import current_zone
 from hoz_dist.graph.scene_graph import SceneGraph
+from hoz_dist.graph.update import current_zone
 
 EdgeCost = Literal["product", "normalized"]
 """``product``: the path of the largest product of edges, the paper's. ``normalized``: the released code's."""

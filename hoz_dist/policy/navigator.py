@@ -54,8 +54,6 @@ def initial_zone_state(batch: int, zones: int) -> ZoneState:
 def distance(nodes: Tensor, bag: Tensor) -> Tensor:
     """Return d(f, delta_k) = ||f - delta_k||_2 + 1 / (f . delta_k + alpha) of every zone [Eq. 3].
 
-    As `hoz_dist.graph.matching.distance`, for a batch of agents.
-
     Args:
         nodes: delta, [B, K, N].
         bag: f, [B, N].

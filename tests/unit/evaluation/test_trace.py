@@ -8,8 +8,8 @@ from hoz_dist.evaluation.agents import OracleAgent, RandomAgent
 from hoz_dist.evaluation.benchmark import Benchmark
 from hoz_dist.evaluation.loading import load_agent
 from hoz_dist.evaluation.trace import trace_episodes
-from hoz_dist.graph.matching import current_zone
 from hoz_dist.graph.planner import next_hops
+from hoz_dist.graph.update import current_zone
 from hoz_dist.nav.actions import Action
 from hoz_dist.nav.categories import SCENES
 from hoz_dist.nav.rooms import RoomId

@@ -3,7 +3,7 @@ import itertools
 import numpy as np
 import pytest
 
-from hoz_dist.graph.matching import current_zone, distance, match
+from hoz_dist.graph.matching import distance, match
 
 
 def test_distance_by_hand() -> None:
@@ -38,24 +38,3 @@ def test_matching_undoes_a_permutation() -> None:
 def test_zones_that_are_alike_keep_their_numbers() -> None:
     nodes = np.full((8, 22), 0.5)
     np.testing.assert_array_equal(match(nodes, nodes), np.arange(8))
-
-
-def test_current_zone_is_the_closest() -> None:
-    rng = np.random.default_rng(0)
-    nodes, bag = rng.random((8, 22)), rng.random(22) < 0.3
-    assert current_zone(nodes, bag) == min(range(8), key=lambda zone: float(distance(nodes[zone], bag.astype(float))))
-
-
-@pytest.mark.parametrize("zone", range(4))
-def test_seeing_what_a_zone_shows_finds_that_zone(zone: int) -> None:
-    nodes = np.zeros((4, 22))
-    for number in range(4):
-        nodes[number, number * 5 : number * 5 + 5] = 0.8
-    assert current_zone(nodes, nodes[zone] > 0) == zone
-
-
-def test_bags_in_a_batch_do_not_mix() -> None:
-    rng = np.random.default_rng(0)
-    nodes, bags = rng.random((5, 8, 22)), rng.random((5, 22))
-    alone = [current_zone(node, bag) for node, bag in zip(nodes, bags, strict=True)]
-    assert current_zone(nodes, bags).tolist() == alone

@@ -1,7 +1,7 @@
 import numpy as np
 import torch
 
-from hoz_dist.graph.matching import current_zone
+from hoz_dist.graph.update import current_zone, update
 from hoz_dist.nav.actions import Action
 from hoz_dist.policy.layers import DoneReminder, ObjectLayer, ZoneLayer
 from hoz_dist.policy.navigator import distance
@@ -25,26 +25,13 @@ def test_object_layer_is_zero_when_nothing_is_seen() -> None:
     assert layer(torch.zeros(1, 5, 5), torch.zeros(1, 5, 4), torch.eye(5)[[2]]).abs().max() == 0.0
 
 
-def test_zone_update_by_hand() -> None:
-    """At lambda = 0.1 the current zone of each episode moves a tenth of the way to what is seen; the others stay."""
-    layer = ZoneLayer(categories=3, features=2)
-    nodes = torch.tensor([[0.5, 0.0, 1.0], [0.2, 0.4, 0.6]]).expand(2, 2, 3).clone()
-    bags = torch.tensor([[1.0, 0.0, 0.0], [0.0, 1.0, 1.0]])
-    with torch.no_grad():
-        moved = layer.update(nodes, bags, torch.eye(2))
-    expected = torch.tensor([[[0.55, 0.0, 0.9], [0.2, 0.4, 0.6]], [[0.5, 0.0, 1.0], [0.18, 0.46, 0.64]]])
-    torch.testing.assert_close(moved, expected)
-    assert nodes[0].tolist() == nodes[1].tolist(), "the nodes before are left alone"
-
-
 def test_zone_update_is_equation_4() -> None:
     layer = ZoneLayer(categories=6, features=2)
-    nodes, bag, chosen = torch.rand(4, 6), torch.tensor([1.0, 0, 0, 1, 0, 0]), torch.eye(4)[:, [2]]  # Zc, [K, 1]
+    nodes, bag = torch.rand(1, 4, 6), torch.tensor([[1.0, 0, 0, 1, 0, 0]])
     with torch.no_grad():
-        moved = layer.update(nodes[None], bag[None], chosen.T)[0]
-        rate = layer.update_rate
-        expected = rate * chosen @ bag[None] + (torch.eye(4) - rate * chosen @ chosen.T) @ nodes
-    torch.testing.assert_close(moved, expected)
+        moved = layer.update(nodes, bag, torch.eye(4)[[2]])
+    expected = update(nodes[0].double().numpy(), bag[0].double().numpy(), 2, layer.update_rate.item())
+    np.testing.assert_allclose(moved[0].numpy(), expected, rtol=1e-6)
 
 
 def test_update_rate_stays_between_zero_and_one() -> None:

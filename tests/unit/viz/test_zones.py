@@ -3,8 +3,8 @@ import struct
 import numpy as np
 import pytest
 
-from hoz_dist.graph.matching import current_zone
 from hoz_dist.graph.scene_graph import SceneGraph
+from hoz_dist.graph.update import current_zone
 from hoz_dist.nav.categories import TARGETS
 from hoz_dist.viz.zones import png, room_figure, scene_graph_figure, zone_colours
 from tests.unit.graph.samples import open_floor, random_bags, random_scene_graph
