@@ -24,6 +24,6 @@ COMPONENTS: Final = Table(
         Row(name="hoz without object and zone", agent="hoz", options={"without": ("object", "zone")}),
         HOZ,
     ),
-    note="The rows are ours: the paper's were not at hand. Without the scene layer, hoz is told the true scene. The last "
-    "two without: what zones give to a policy that sees no boxes itself.",
+    note="The rows are ours: the paper's were not at hand. Without the scene layer, hoz is told the true scene. The "
+    "two without the object layer say what zones give to a policy that sees no boxes itself.",
 )
