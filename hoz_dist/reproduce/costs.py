@@ -10,11 +10,9 @@ from hoz_dist.reproduce.job import Job, Task, Training
 
 START_S: Final = 10.0
 """Starting a learner and an actor, opening the rooms and saving the last checkpoint, seconds."""
-SHARE_IN_SERVICE: Final = 0.85
-"""Frames per second of a learner and its actor over those of the same loop in one process (`docs/performance.md`)."""
 STEP_S: Final = 0.00002
 """A step of an episode of an agent that is not trained takes this long, seconds; it looks at nothing."""
-SHARE_COMPUTED: Final = 0.1
+SHARE_COMPUTED: Final = 0.2
 """Steps that a trial computes over those of all its episodes up to the largest cap: most end long before, and those
 that have ended are soon dropped."""
 
@@ -23,7 +21,8 @@ class Speed(NamedTuple):
     """What was measured of an agent while as many processes were busy as will be."""
 
     frames_per_second: float
-    """Of training, in one process."""
+    """Of training from its beginning, in one process. A learner and an actor take about as long: what sending costs
+    (docs/performance.md), they save later, when episodes are longer and fewer begin."""
     step_seconds: float
     """Of one step of one episode of a trial."""
 
@@ -45,8 +44,7 @@ class Costs:
             done: Frames that it has made already.
         """
         left = max(0, training.frames - done)
-        speed = self.speeds[training.digest].frames_per_second * SHARE_IN_SERVICE
-        return START_S + left / speed if left else 0.0
+        return START_S + left / self.speeds[training.digest].frames_per_second if left else 0.0
 
     def of_test(self, job: Job) -> float:
         """Return the seconds of a test."""

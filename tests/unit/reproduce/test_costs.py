@@ -2,7 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from hoz_dist.reproduce.costs import SHARE_COMPUTED, SHARE_IN_SERVICE, START_S, STEP_S, Costs, Speed, makespan
+from hoz_dist.reproduce.costs import SHARE_COMPUTED, START_S, STEP_S, Costs, Speed, makespan
 from hoz_dist.reproduce.job import jobs_of, tasks_of
 from tests.unit.reproduce.making import TABLE, TINY
 
@@ -17,7 +17,7 @@ def costs() -> Costs:
 
 def test_a_task_is_its_training_its_choice_and_its_tests(costs: Costs, tmp_path: Path) -> None:
     (task,) = tasks_of(JOBS, tmp_path)
-    train = START_S + 1000 / (100 * SHARE_IN_SERVICE)
+    train = START_S + 1000 / 100
     # Bathrooms end after 100 actions; every step costs 1 ms for each episode.
     choose, test = (number * 100 * SHARE_COMPUTED * 0.001 for number in (3 * 600, 2 * 8))
     assert costs.of_task(task, task.jobs) == pytest.approx(train + choose + 2 * test)
