@@ -151,10 +151,10 @@ def work_off(
         OwnMistakeError: A process failed without a reason.
     """
     from hoz_dist.cli.progress import duration
-    from hoz_dist.cli.reproduce_costs import measure_costs, missing_rooms, render, rooms_needed
-    from hoz_dist.cli.reproduce_crew import run_tasks, seconds_left
-    from hoz_dist.cli.reproduce_sessions import Session
-    from hoz_dist.cli.reproduce_task import Place
+    from hoz_dist.cli.reproducing.costs import measure_costs, missing_rooms, render, rooms_needed
+    from hoz_dist.cli.reproducing.crew import run_tasks, seconds_left
+    from hoz_dist.cli.reproducing.sessions import Session
+    from hoz_dist.cli.reproducing.task import Place
     from hoz_dist.reproduce.costs import makespan
     from hoz_dist.reproduce.job import tasks_of
     from hoz_dist.sim.view_store import default_cache
@@ -205,8 +205,8 @@ def _show(
     as_json: bool,
 ) -> None:
     """Write the table's files, and print it."""
-    from hoz_dist.cli.reproduce_results import Results
-    from hoz_dist.cli.reproduce_sessions import read_sessions
+    from hoz_dist.cli.reproducing.results import Results
+    from hoz_dist.cli.reproducing.sessions import read_sessions
 
     results = Results.read(table, budget, command, jobs, out, seeds=seeds)
     sessions = [

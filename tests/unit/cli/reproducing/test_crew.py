@@ -7,13 +7,13 @@ from typing import Any
 
 import pytest
 
-from hoz_dist.cli import reproduce_costs
-from hoz_dist.cli.reproduce_crew import Worker
-from hoz_dist.cli.reproduce_task import Report
+from hoz_dist.cli.reproducing import costs as reproduce_costs
+from hoz_dist.cli.reproducing.crew import Worker
+from hoz_dist.cli.reproducing.task import Report
 from hoz_dist.errors import HozError, OwnMistakeError
 from hoz_dist.reproduce.costs import Speed
 from hoz_dist.reproduce.job import jobs_of, tasks_of
-from tests.unit.cli.workers import Worked
+from tests.unit.cli.reproducing.workers import Worked
 from tests.unit.reproduce.making import TABLE, TINY
 
 

@@ -5,8 +5,9 @@ from types import SimpleNamespace
 
 import pytest
 
-from hoz_dist.cli import measure, reproduce_task
-from hoz_dist.cli.reproduce_task import Place, Report
+from hoz_dist.cli import measure
+from hoz_dist.cli.reproducing import task as reproduce_task
+from hoz_dist.cli.reproducing.task import Place, Report
 from hoz_dist.evaluation.trials import Evaluation
 from hoz_dist.nav.episode import EpisodeResult
 from hoz_dist.nav.rooms import RoomId

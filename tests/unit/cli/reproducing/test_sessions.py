@@ -4,8 +4,8 @@ from typing import Any
 
 import pytest
 
-from hoz_dist.cli import reproduce_sessions
-from hoz_dist.cli.reproduce_sessions import Session, read_sessions
+from hoz_dist.cli.reproducing import sessions
+from hoz_dist.cli.reproducing.sessions import Session, read_sessions
 from tests.waiting import until
 
 
@@ -14,7 +14,7 @@ def newest(out: Path) -> dict[str, Any]:
 
 
 def test_what_a_session_took_is_noted_while_it_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(reproduce_sessions, "NOTE_S", 0.01)
+    monkeypatch.setattr(sessions, "NOTE_S", 0.01)
     with Session(tmp_path, {"table": "some"}):
         # So a kill at any moment leaves the seconds until then.
         until(lambda: newest(tmp_path)["took_seconds"] > 0.0, "a note")

@@ -7,15 +7,16 @@ from typing import Any
 
 import pytest
 
-from hoz_dist.cli import reproduce_costs, reproduce_crew
 from hoz_dist.cli.main import EXIT_FAILED, EXIT_USER_ERROR, run
 from hoz_dist.cli.processes import MOST_RESTARTS
-from hoz_dist.cli.reproduce_sessions import read_sessions
+from hoz_dist.cli.reproducing import costs as reproduce_costs
+from hoz_dist.cli.reproducing import crew as reproduce_crew
+from hoz_dist.cli.reproducing.sessions import read_sessions
 from hoz_dist.reproduce.budget import BUDGETS
 from hoz_dist.reproduce.costs import Costs, Speed
 from hoz_dist.reproduce.job import Task
 from hoz_dist.reproduce.tables import TABLES
-from tests.unit.cli.workers import Worked
+from tests.unit.cli.reproducing.workers import Worked
 from tests.unit.reproduce.making import TABLE, TINY, make_outcome
 
 Start = Callable[[Task], Worked]

@@ -11,7 +11,7 @@ from typing import Any, Final
 
 from hoz_dist.cli.progress import Progress
 from hoz_dist.cli.rendering import Encoding, render_rooms
-from hoz_dist.cli.reproduce_crew import OUR_MISTAKE, Worker
+from hoz_dist.cli.reproducing.crew import OUR_MISTAKE, Worker
 from hoz_dist.errors import HozError, OwnMistakeError
 from hoz_dist.nav.rooms import RoomId, training_rooms
 from hoz_dist.policy.encoders import load_encoder

@@ -16,7 +16,7 @@ from hoz_dist.cli.child import die_with_parent
 from hoz_dist.cli.main import sentence_of
 from hoz_dist.cli.processes import MOST_RESTARTS, STOP_S
 from hoz_dist.cli.progress import Progress
-from hoz_dist.cli.reproduce_task import Place, Report, frames_of, perform
+from hoz_dist.cli.reproducing.task import Place, Report, frames_of, perform
 from hoz_dist.errors import HozError, OwnMistakeError
 from hoz_dist.reproduce.costs import Costs, makespan
 from hoz_dist.reproduce.job import Task

@@ -7,13 +7,13 @@ import pytest
 from filelock import FileLock
 
 from hoz_dist.cli.main import EXIT_USER_ERROR, run
-from hoz_dist.cli.reproduce_results import Results
+from hoz_dist.cli.reproducing.results import Results
 from hoz_dist.reproduce.job import jobs_of
 from hoz_dist.reproduce.outcome import METRICS
 from hoz_dist.reproduce.tables import TABLES
 from tests.unit.reproduce.making import TABLE, TINY, make_outcome
 
-DOCS = Path(__file__).parents[3] / "docs" / "results"
+DOCS = Path(__file__).parents[4] / "docs" / "results"
 
 
 def test_without_a_table_all_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
