@@ -1,4 +1,5 @@
 import json
+import re
 import shutil
 from pathlib import Path
 from typing import Any
@@ -47,7 +48,8 @@ def test_help_says_what_a_budget_gives(capsys: pytest.CaptureFixture[str]) -> No
     assert run(["reproduce", "--help"]) == 0
     said = " ".join(capsys.readouterr().out.split())
     assert "quick: 2M frames in rooms, 3M in apartments, 1-2 seeds;" in said
-    assert "full: 16M frames in rooms, 24M in apartments, 5 seeds" in said
+    # The help is made when the command is first imported, and a test before may have added a budget of its own.
+    assert re.search(r"full: 16M frames in rooms, 24M in apartments, 5 seeds[.;]", said)
 
 
 def test_a_table_can_be_shown_before_anything_is_finished(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
