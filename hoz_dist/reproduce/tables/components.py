@@ -12,7 +12,7 @@ from hoz_dist.reproduce.tables.common import A3C, HOZ, OBJECT, WITHOUT_ZONE
 COMPONENTS: Final = Table(
     name="components",
     title="Components of HOZ (Table 2)",
-    references=("hoz", "a3c"),
+    references=("hoz", "object", "hoz without object and zone", "a3c"),
     rows=(
         A3C,
         OBJECT,
