@@ -14,7 +14,15 @@ _NOTHING: Final = "-"
 _METRICS: Final = ("SR", "SPL", "SAE", "SR, L>=5", "SPL, L>=5", "SAE, L>=5")
 _ONE_SEED: Final = "†"
 _JUDGED: Final = ("sr", "spl")
-"""Metrics of which the sentence above the differences tells."""
+"""Metrics of which the sentence above the differences tells, and the tables by scene and by L*."""
+_ALIKE_PP: Final = 2.0
+"""An interval around 0 that goes no further says that two rows are alike, percent points."""
+_BETTER: Final = "better"
+_WORSE: Final = "worse"
+_ALIKE: Final = f"alike within {_ALIKE_PP:g} points"
+_UNKNOWN: Final = "not told apart"
+_NOT_JUDGED: Final = "of one seed, so not judged"
+_VERDICTS: Final = (_BETTER, _WORSE, _ALIKE, _UNKNOWN, _NOT_JUDGED)
 
 
 def table_text(
@@ -51,6 +59,7 @@ def table_text(
             lines += ["", f"## Differences from {reference}", "", *_verdicts(compared, reference, summaries), ""]
             lines += _differences(compared, reference, summaries)
             lines += ["", _kind(compared, reference, summaries)]
+            lines += _where(compared, summaries) if reference == table.references[0] else []
     return "\n".join([*lines, ""])
 
 
@@ -71,7 +80,7 @@ def _protocol(table: Table, budget: Budget, summaries: Mapping[str, RowSummary],
         f"`{command}`: {frames:g}M frames for each training run; the checkpoint was chosen among the last "
         f"{budget.candidates} of {budget.checkpoints} on validation rooms. {one.episodes['all']} episodes in test rooms"
         f", {one.episodes.get('long', 0)} of them with L* >= 5; {budget.trials} trials. Percent; ± is the standard "
-        "deviation over the trials of all seeds. The paper's figures are of AI2-THOR."
+        "deviation over seeds, of rows without several that over trials. The paper's figures are of AI2-THOR."
     )
 
 
@@ -94,19 +103,44 @@ def _figures(rows: Sequence[Row], summaries: Mapping[str, RowSummary]) -> list[s
 
 
 def _verdicts(compared: Sequence[Row], reference: str, summaries: Mapping[str, RowSummary]) -> list[str]:
-    """Say in a line for each metric which rows are better and worse than the reference in long episodes."""
+    """Say in a line for each metric which trained rows are better and worse than the reference in long episodes."""
     lines = []
     for metric in _JUDGED:
-        better, worse, alike, unknown = list[str](), list[str](), list[str](), list[str]()
+        verdicts: dict[str, list[str]] = {}
         for row in compared:
-            interval = summaries[row.name].differences[reference].get("long", {}).get(metric)
-            if interval is None or _of_one_seed(row, reference, summaries):
-                unknown.append(row.name)
-            else:
-                (better if interval.low > 0 else worse if interval.high < 0 else alike).append(row.name)
-        parts = {"better": better, "worse": worse, "not told apart": alike, "of one seed, so not judged": unknown}
-        text = "; ".join(f"{name}: {', '.join(rows)}" for name, rows in parts.items() if rows)
-        lines.append(f"- {metric.upper()} of episodes with L* >= 5, against {reference}: {text}.")
+            if row.agent not in BASELINES:
+                interval = summaries[row.name].differences[reference].get("long", {}).get(metric)
+                known = None if _of_one_seed(row, reference, summaries) else interval
+                verdicts.setdefault(_verdict(known), []).append(row.name)
+        if verdicts:
+            text = "; ".join(
+                f"{verdict}: {', '.join(verdicts[verdict])}" for verdict in _VERDICTS if verdict in verdicts
+            )
+            lines.append(f"- {metric.upper()} of episodes with L* >= 5, against {reference}: {text}.")
+    return lines
+
+
+def _verdict(interval: Interval | None) -> str:
+    """Say in words what an interval tells; None is one that leaves out how much another training would differ."""
+    if interval is None:
+        return _NOT_JUDGED
+    if interval.low > 0:
+        return _BETTER
+    if interval.high < 0:
+        return _WORSE
+    return _ALIKE if interval.low >= -_ALIKE_PP and interval.high <= _ALIKE_PP else _UNKNOWN
+
+
+def _where(compared: Sequence[Row], summaries: Mapping[str, RowSummary]) -> list[str]:
+    """Write the differences from the first reference by scene and by L*."""
+    rows = [row for row in compared if row.agent not in BASELINES and summaries[row.name].where]
+    if not rows:
+        return []
+    groups = list(summaries[rows[0].name].where)
+    lines = []
+    for metric in _JUDGED:
+        cells = [[row.name, *(_interval(summaries[row.name].where[group][metric]) for group in groups)] for row in rows]
+        lines += ["", *aligned([f"{metric.upper()} by scene and L*", *groups], cells)]
     return lines
 
 
@@ -131,9 +165,8 @@ def _kind(compared: Sequence[Row], reference: str, summaries: Mapping[str, RowSu
     """Say what the intervals are of."""
     text = (
         f"Row minus {reference} in percent points, with {CONFIDENCE:.0%} intervals: {REPLICATES} bootstrap replicates "
-        "over seeds, test rooms and episodes, always the same rooms and episodes for both. An interval without 0 says "
-        "that other trainings, tested in other rooms, would most likely differ in the same direction; few seeds make "
-        "it wide."
+        "over seeds, test rooms and episodes, always the same rooms and episodes for both. When an interval is without "
+        "0, the sign of the difference is unlikely to be chance of seeds or rooms; few seeds make intervals wide."
     )
     if any(_of_one_seed(row, reference, summaries) for row in compared):
         text += f" {_ONE_SEED} One seed, here or there: the interval leaves out how much another training would differ."
@@ -153,7 +186,7 @@ def _spread_of_rows(table: Table, summaries: Mapping[str, RowSummary]) -> str:
 
 
 def _spread(spread: Spread | None) -> str:
-    return _NOTHING if spread is None else f"{spread.mean:.1f} ± {spread.of_trials:.1f}"
+    return _NOTHING if spread is None else f"{spread.mean:.1f} ± {spread.deviation:.1f}"
 
 
 def _interval(interval: Interval | None) -> str:

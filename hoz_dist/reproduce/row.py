@@ -53,7 +53,7 @@ class Table:
     """A sentence's beginning that says what is compared."""
     rows: tuple[Row, ...]
     references: tuple[str, ...]
-    """Names of the rows that all others are measured against."""
+    """Names of the rows that all others are measured against; the first one also by scene and by L*."""
     scenes: tuple[str, ...] = ROOM_SCENES
     """Scenes or training rooms to train in; the evaluation is in their scenes."""
     alike: bool = False

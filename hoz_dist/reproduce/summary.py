@@ -1,8 +1,8 @@
 """What the outcomes of a table's rows say: means, deviations, and differences with intervals; no input or output."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +10,9 @@ from numpy.typing import NDArray
 from hoz_dist.errors import InvalidValueError
 from hoz_dist.reproduce.bootstrap import Interval, Resampling
 from hoz_dist.reproduce.outcome import METRICS, Outcome
+
+LENGTHS: Final = (1, 5, 10, 15, 20, 30)
+"""Least L* of each group of episodes; the last one is open. Groups without episodes are left out."""
 
 
 @dataclass(frozen=True)
@@ -20,7 +23,12 @@ class Spread:
     of_trials: float
     """Over the trials of all seeds, as the paper reports it: drawing actions and, with several seeds, training."""
     of_seeds: float | None
-    """Over the means of the seeds; None for one seed."""
+    """Over the means of the seeds, which is what another training would differ by; None for one seed."""
+
+    @property
+    def deviation(self) -> float:
+        """The deviation over seeds; of one seed, that over its trials."""
+        return self.of_trials if self.of_seeds is None else self.of_seeds
 
     def to_json(self) -> dict[str, float | None]:
         """Return JSON values, percent."""
@@ -39,6 +47,8 @@ class RowSummary:
     """By part and metric."""
     differences: Mapping[str, Mapping[str, Mapping[str, Interval]]]
     """Row - reference, percent points, by reference, part and metric; empty when there is nothing to compare with."""
+    where: Mapping[str, Mapping[str, Interval]]
+    """Row - first reference, percent points, by group of episodes (scene, range of L*) and metric."""
     by_scene: Mapping[str, Mapping[str, float]]
     """Means of all episodes, percent, by scene and metric."""
 
@@ -49,16 +59,8 @@ class RowSummary:
             "trials": self.trials,
             "episodes": dict(self.episodes),
             **{part: {name: one.to_json() for name, one in self.spreads[part].items()} for part in self.spreads},
-            "differences": {
-                reference: {
-                    part: {
-                        metric: {name: _rounded(value) for name, value in interval._asdict().items()}
-                        for metric, interval in of_part.items()
-                    }
-                    for part, of_part in parts.items()
-                }
-                for reference, parts in self.differences.items()
-            },
+            "differences": {reference: _of_parts(parts) for reference, parts in self.differences.items()},
+            "where": _of_parts(self.where),
             "scenes": {
                 scene: {name: _rounded(value) for name, value in values.items()}
                 for scene, values in self.by_scene.items()
@@ -66,12 +68,18 @@ class RowSummary:
         }
 
 
-def summarise(outcomes: Mapping[str, Mapping[int, Outcome]], references: Sequence[str]) -> dict[str, RowSummary]:
+def summarise(
+    outcomes: Mapping[str, Mapping[int, Outcome]],
+    references: Sequence[str],
+    agents: Mapping[str, Hashable] | None = None,
+) -> dict[str, RowSummary]:
     """Summarise the rows of a table.
 
     Args:
         outcomes: By row and seed; all of the same episodes, of each row equally many trials.
         references: Rows that all others are compared with; those without outcomes are left out.
+        agents: What tells each row's agents from others. Rows with the same are the same agents, tested otherwise, so
+            that their seeds are compared one by one; all others, and all if None, are compared by their means.
 
     Returns:
         By row, in the same order.
@@ -93,36 +101,32 @@ def summarise(outcomes: Mapping[str, Mapping[int, Outcome]], references: Sequenc
                 )
                 raise InvalidValueError(message)
     masks = {"all": np.ones(len(first.optimal), dtype=np.bool_), "long": first.long}
-    masks = {part: mask for part, mask in masks.items() if mask.any()}
-    draws = {part: Resampling(first.room[mask], first.scene[mask]) for part, mask in masks.items()}
+    parts = _Comparison.of({part: mask for part, mask in masks.items() if mask.any()}, first)
+    groups = _Comparison.of(_groups(first), first)
     summaries = {}
     for name, by_seed in present.items():
-        values = {metric: _values(by_seed, metric) for metric in METRICS}
+        values = _values(by_seed)
         differences: dict[str, dict[str, dict[str, Interval]]] = {}
+        where: dict[str, dict[str, Interval]] = {}
         for reference in references:
             if reference == name or reference not in present:
                 continue
-            same = tuple(by_seed) == tuple(present[reference])
-            differences[reference] = {
-                part: {
-                    metric: draws[part].interval(
-                        100.0 * values[metric][..., mask].mean(axis=1),
-                        100.0 * _values(present[reference], metric)[..., mask].mean(axis=1),
-                        same_seeds=same,
-                    )
-                    for metric in METRICS
-                }
-                for part, mask in masks.items()
-            }
+            same = agents is not None and agents[name] == agents[reference]
+            same_seeds = same and tuple(by_seed) == tuple(present[reference])
+            theirs = _values(present[reference])
+            differences[reference] = parts.intervals(values, theirs, same_seeds=same_seeds)
+            if reference == references[0]:
+                where = groups.intervals(values, theirs, same_seeds=same_seeds)
         summaries[name] = RowSummary(
             seeds=tuple(by_seed),
             trials=len(next(iter(by_seed.values())).success),
-            episodes={part: int(mask.sum()) for part, mask in masks.items()},
+            episodes={part: int(mask.sum()) for part, mask in parts.masks.items()},
             spreads={
                 part: {metric: _spread(100.0 * values[metric][..., mask].mean(axis=-1)) for metric in METRICS}
-                for part, mask in masks.items()
+                for part, mask in parts.masks.items()
             },
             differences=differences,
+            where=where,
             by_scene={
                 str(scene): {
                     metric: 100.0 * float(values[metric][..., first.scene == scene].mean()) for metric in METRICS
@@ -133,9 +137,50 @@ def summarise(outcomes: Mapping[str, Mapping[int, Outcome]], references: Sequenc
     return summaries
 
 
-def _values(by_seed: Mapping[int, Outcome], metric: str) -> NDArray[np.float64]:
-    """Return what each episode counts, [S, T, E]."""
-    return np.stack([outcome.values(metric) for outcome in by_seed.values()])
+@dataclass(frozen=True, eq=False)
+class _Comparison:
+    """Compares rows in sets of episodes."""
+
+    masks: Mapping[str, NDArray[np.bool_]]
+    """Which episodes are in each set, [E]."""
+    draws: Mapping[str, Resampling]
+    """Of each set."""
+
+    @classmethod
+    def of(cls, masks: Mapping[str, NDArray[np.bool_]], first: Outcome) -> "_Comparison":
+        """Draw once for all comparisons of some sets."""
+        return cls(masks, {name: Resampling(first.room[mask], first.scene[mask]) for name, mask in masks.items()})
+
+    def intervals(
+        self, row: Mapping[str, NDArray[np.float64]], reference: Mapping[str, NDArray[np.float64]], *, same_seeds: bool
+    ) -> dict[str, dict[str, Interval]]:
+        """Return row - reference, percent points, by set and metric, of what each episode counts, [S, T, E]."""
+        return {
+            name: {
+                metric: self.draws[name].interval(
+                    100.0 * row[metric][..., mask].mean(axis=1),
+                    100.0 * reference[metric][..., mask].mean(axis=1),
+                    same_seeds=same_seeds,
+                )
+                for metric in METRICS
+            }
+            for name, mask in self.masks.items()
+        }
+
+
+def _groups(first: Outcome) -> dict[str, NDArray[np.bool_]]:
+    """Return the groups of episodes in which rows are compared: scenes, if there are several, and ranges of L*."""
+    scenes = dict.fromkeys(first.scene.tolist())
+    groups = {str(scene): first.scene == scene for scene in scenes} if len(scenes) > 1 else {}
+    for least, following in zip(LENGTHS, (*LENGTHS[1:], None), strict=True):
+        name = f"L* {least}+" if following is None else f"L* {least}-{following - 1}"
+        groups[name] = (first.optimal >= least) & (True if following is None else first.optimal < following)
+    return {name: mask for name, mask in groups.items() if mask.any()}
+
+
+def _values(by_seed: Mapping[int, Outcome]) -> dict[str, NDArray[np.float64]]:
+    """Return what each episode counts, by metric, [S, T, E]."""
+    return {metric: np.stack([outcome.values(metric) for outcome in by_seed.values()]) for metric in METRICS}
 
 
 def _spread(means: NDArray[np.float64]) -> Spread:
@@ -149,3 +194,14 @@ def _spread(means: NDArray[np.float64]) -> Spread:
 
 def _rounded(value: float | None) -> float | None:
     return None if value is None else round(value, 2)
+
+
+def _of_parts(parts: Mapping[str, Mapping[str, Interval]]) -> dict[str, dict[str, dict[str, float | None]]]:
+    """Return intervals by part and metric as JSON values."""
+    return {
+        part: {
+            metric: {name: _rounded(value) for name, value in interval._asdict().items()}
+            for metric, interval in of_part.items()
+        }
+        for part, of_part in parts.items()
+    }

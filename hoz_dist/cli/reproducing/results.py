@@ -59,7 +59,11 @@ class Results:
             name: {job.seed: Outcome.load(job.result(out)) for job in of_row if job.result(out).exists()}
             for name, of_row in jobs.items()
         }
-        return cls(table, budget, command, seeds, jobs, outcomes, summarise(outcomes, table.references))
+        # Baselines are not trained, and like nobody else.
+        agents = {
+            name: name if of_row[0].training is None else of_row[0].training.digest for name, of_row in jobs.items()
+        }
+        return cls(table, budget, command, seeds, jobs, outcomes, summarise(outcomes, table.references, agents))
 
     @property
     def unfinished(self) -> dict[str, tuple[int, int]]:

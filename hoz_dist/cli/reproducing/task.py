@@ -12,6 +12,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cache
+from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
 
@@ -34,6 +35,8 @@ Stage = Literal["training", "choosing", "testing", "failed"]
 FREE_S: Final = 30.0
 """How long a learner of a killed command may take to end, seconds."""
 _POLL_S: Final = 0.1
+_LIBRARIES: Final = ("torch", "numpy", "pybullet")
+"""Whose versions are kept beside what was computed with them."""
 
 
 class Report(NamedTuple):
@@ -157,18 +160,26 @@ def _test(job: Job, place: Place, tell: Tell) -> None:
     from hoz_dist.reproduce.outcome import Outcome
     from learner.checkpoint import load_checkpoint
 
-    facts: dict[str, Any] = {"agent": job.agent, "version": __version__, "cores": len(os.sched_getaffinity(0))}
+    facts: dict[str, Any] = {
+        "agent": job.agent,
+        "version": __version__,
+        "libraries": {name: version(name) for name in _LIBRARIES},
+        "cores": len(os.sched_getaffinity(0)),
+    }
     protocol, config = job.protocol, job.test_config
     chosen = None
     if job.training is not None:
         checkpoint, choice = _choose(job, job.training, place, tell)
+        newest = load_checkpoint(job.training.folder(place.out))
         chosen = replace(checkpoint, config=config)
         facts |= {
             "config": config.to_json(),
             "rooms_trained_in": list(job.training.scenes),
             "tested_with": dict(job.tested_with),
             "frames": checkpoint.frames,
-            "training_seconds": round(load_checkpoint(job.training.folder(place.out)).seconds, 1),
+            # A run that went on from a checkpoint after a kill is not the same again with the same seed.
+            "epochs": newest.epoch,
+            "training_seconds": round(newest.seconds, 1),
             "seconds_to_chosen": round(checkpoint.seconds, 1),
             "choice": choice,
         }

@@ -12,11 +12,11 @@ from hoz_dist.reproduce.tables.common import A3C, HOZ, OBJECT, WITHOUT_ZONE
 COMPONENTS: Final = Table(
     name="components",
     title="Components of HOZ (Table 2)",
-    references=("hoz", "object", "hoz without object and zone", "a3c"),
+    references=("object", "hoz", "hoz without object and zone", "a3c"),
     rows=(
         A3C,
         OBJECT,
-        Row(name="object and zone", agent="hoz", options={"without": ("scene", "done")}),
+        Row(name="object and zone", agent="hoz", key=True, options={"without": ("scene", "done")}),
         Row(name="object, scene and zone", agent="hoz", options={"without": ("done",)}),
         WITHOUT_ZONE,
         Row(name="hoz without scene", agent="hoz", options={"without": ("scene",)}),

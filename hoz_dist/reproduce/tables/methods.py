@@ -12,7 +12,7 @@ from hoz_dist.reproduce.tables.common import A3C, HOZ, OBJECT, ORACLE, RANDOM
 METHODS: Final = Table(
     name="methods",
     title="Methods in rooms (Tables 3 and 9)",
-    references=("a3c", "object"),
+    references=("object", "a3c"),
     rows=(
         RANDOM,
         A3C,

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from hoz_dist.reproduce.bootstrap import REPLICATES, Resampling
+from hoz_dist.reproduce.bootstrap import REPLICATES, Resampling, degrees_of_freedom
 
 
 def alone(episodes: int, replicates: int = REPLICATES) -> Resampling:
@@ -62,17 +62,31 @@ def test_pairs_of_seeds_cancel_and_others_do_not() -> None:
     paired = alone(50).interval(row, reference, same_seeds=True)
     assert (paired.low, paired.high) == pytest.approx((0.1, 0.1), abs=1e-5)
     unpaired = alone(50).interval(row, reference, same_seeds=False)
-    assert unpaired.high - unpaired.low == pytest.approx(student_width(of_seeds) * 2**0.5, rel=0.15)
+    welch = stats.ttest_ind(row[:, 0], reference[:, 0], equal_var=False).confidence_interval()
+    assert (unpaired.low, unpaired.high) == pytest.approx((welch.low, welch.high), abs=0.05)
 
 
-@pytest.mark.parametrize("seeds", [3, 5])
-def test_a_few_seeds_are_not_taken_for_many(seeds: int) -> None:
+@pytest.mark.parametrize(("of_row", "of_reference", "same"), [(3, 3, True), (5, 5, True), (3, 3, False), (3, 5, False)])
+def test_a_few_seeds_are_not_taken_for_many(of_row: int, of_reference: int, same: bool) -> None:
     rng, draws, held = np.random.default_rng(5), alone(20, replicates=1000), 0
     for _ in range(400):
-        row, reference = np.repeat(rng.standard_normal((2, seeds, 1)), 20, axis=2)
-        interval = draws.interval(row, reference, same_seeds=True)
+        row, reference = (np.repeat(rng.standard_normal((seeds, 1)), 20, axis=1) for seeds in (of_row, of_reference))
+        interval = draws.interval(row, reference, same_seeds=same)
         held += interval.low <= 0.0 <= interval.high
     assert 0.9 <= held / 400 <= 0.99
+
+
+@pytest.mark.parametrize("deviations", [(1.0, 1.0), (1.0, 0.1), (0.1, 1.0), (0.0, 1.0)])
+def test_degrees_of_freedom_are_scipys(deviations: tuple[float, float]) -> None:
+    rng = np.random.default_rng(1)
+    sides = [deviation * rng.standard_normal(seeds) for deviation, seeds in zip(deviations, (3, 5), strict=True)]
+    assert degrees_of_freedom(sides) == pytest.approx(stats.ttest_ind(*sides, equal_var=False).df)
+    assert degrees_of_freedom([sides[0] + 1e-9 * np.arange(3)]) == pytest.approx(2)
+    assert degrees_of_freedom([sides[1], np.array([0.3])]) == pytest.approx(4)
+
+
+def test_seeds_that_do_not_vary_have_no_noise() -> None:
+    assert degrees_of_freedom([np.ones(3), np.ones(5)]) == np.inf
 
 
 def test_intervals_of_chance_hold_the_truth_as_often_as_they_say() -> None:

@@ -73,7 +73,11 @@ def test_markdown_has_rows_intervals_and_the_papers_figures(outcomes: dict[str, 
     assert lines[0] == "# Some rows"
     row = next(line for line in lines if line.startswith("| random"))
     assert "57.35/33.78/19.02" in row
-    assert f"{summaries['random'].spreads['all']['sr'].mean:.1f} ±" in row
+    spread = summaries["random"].spreads["all"]["sr"]
+    assert f"{spread.mean:.1f} ± {spread.of_trials:.1f}" in row  # it has no seeds
+    assert spread.of_seeds is None
+    spread = summaries["hoz"].spreads["all"]["sr"]
+    assert f"{spread.mean:.1f} ± {spread.of_seeds:.1f}" in next(line for line in lines if line.startswith("| hoz"))
     interval = summaries["object"].differences["hoz"]["all"]["sr"]
     assert f"{interval.difference:+.1f} [{interval.low:+.1f}, {interval.high:+.1f}]" in text
     assert "†" not in text  # of random, which is not trained, one seed is all
@@ -87,33 +91,71 @@ def test_markdown_has_rows_intervals_and_the_papers_figures(outcomes: dict[str, 
 def test_comparisons_of_one_training_are_told(outcomes: dict[str, dict[int, Outcome]]) -> None:
     del outcomes["object"][1]
     text = table_text(TABLE, TINY, summarise(outcomes, TABLE.references), "command", {})
-    assert "- SR of episodes with L* >= 5, against hoz: worse: random; of one seed, so not judged: object." in text
+    assert "- SR of episodes with L* >= 5, against hoz: of one seed, so not judged: object." in text
     assert "| object † |" in text
     assert "† One seed" in text
 
 
-def test_rows_are_judged_by_their_intervals() -> None:
+def test_rows_are_judged_by_their_intervals_and_baselines_are_not() -> None:
     skills, references = {"random": 0.1, "object": 0.5, "hoz": 0.9}, ("hoz", "object")
     outcomes = {
         name: {seed: make_outcome(10 * number + seed, skill=skill) for seed in range(5)}
         for number, (name, skill) in enumerate(skills.items())
     }
-    outcomes["same"] = outcomes["object"]
-    table = replace(TABLE, rows=(*TABLE.rows, Row(name="same", agent="object")), references=references)
-    text = table_text(table, TINY, summarise(outcomes, references), "command", {})
-    assert "- SR of episodes with L* >= 5, against object: better: hoz; worse: random; not told apart: same." in text
+    outcomes |= {"same": outcomes["object"], "near": {seed: make_outcome(50 + seed, skill=0.5) for seed in range(5)}}
+    rows = (*TABLE.rows, Row(name="same", agent="object"), Row(name="near", agent="object"))
+    table = replace(TABLE, rows=rows, references=references)
+    agents = {name: "object" if name == "same" else name for name in outcomes}
+    text = table_text(table, TINY, summarise(outcomes, references, agents), "command", {})
+    judged = "better: hoz; alike within 2 points: same; not told apart: near."
+    assert f"- SR of episodes with L* >= 5, against object: {judged}" in text
+    assert "against hoz: worse: object, same, near." in text
 
 
-def test_pairs_of_seeds_are_compared_pair_by_pair(outcomes: dict[str, dict[int, Outcome]]) -> None:
-    # The second row has the first one's results but for what both lose with a bad seed.
-    skills = (0.3, 0.6, 0.9)
-    both = {seed: make_outcome(seed, skill=skill) for seed, skill in enumerate(skills)}
-    paired = summarise({"hoz": both, "object": dict(both)}, ["hoz"])["object"].differences["hoz"]["all"]["sr"]
-    assert (paired.low, paired.high) == (0.0, 0.0)
+def test_the_same_agents_are_compared_seed_by_seed_and_others_are_not() -> None:
+    # Both rows have the same results, so that the same agents differ by nothing, and other ones by how much seeds vary.
+    both = {seed: make_outcome(seed, skill=skill) for seed, skill in enumerate((0.3, 0.6, 0.9))}
+    rows = {"hoz": both, "object": dict(both)}
+    same = summarise(rows, ["hoz"], {"hoz": "a", "object": "a"})["object"].differences["hoz"]["all"]["sr"]
+    assert (same.low, same.high) == (0.0, 0.0)
+    for agents in ({"hoz": "a", "object": "b"}, None):
+        apart = summarise(rows, ["hoz"], agents)["object"].differences["hoz"]["all"]["sr"]
+        assert apart.low < -10
+        assert apart.high > 10
+
+
+def test_the_same_agents_of_other_seeds_are_not_paired() -> None:
+    both = {seed: make_outcome(seed, skill=skill) for seed, skill in enumerate((0.3, 0.6, 0.9))}
     others = {seed + 1: outcome for seed, outcome in both.items()}
-    apart = summarise({"hoz": both, "object": others}, ["hoz"])["object"].differences["hoz"]["all"]["sr"]
-    assert apart.low < -10
-    assert apart.high > 10
+    rows = {"hoz": both, "object": others}
+    interval = summarise(rows, ["hoz"], {"hoz": "a", "object": "a"})["object"].differences["hoz"]["all"]["sr"]
+    assert interval.low < -10
+
+
+def test_rows_are_compared_with_the_first_reference_by_scene_and_length(
+    outcomes: dict[str, dict[int, Outcome]],
+) -> None:
+    summaries = summarise(outcomes, ["object", "hoz"])
+    where = summaries["hoz"].where
+    assert list(where) == ["kitchen", "bathroom", "L* 1-4", "L* 5-9", "L* 10-14"]
+    assert summaries["object"].where == {}
+    first = outcomes["hoz"][0]
+    masks = {"bathroom": first.scene == "bathroom", "L* 5-9": (first.optimal >= 5) & (first.optimal < 10)}
+    for name, mask in masks.items():
+        means = [np.mean([one.success[:, mask].mean() for one in outcomes[row].values()]) for row in ("hoz", "object")]
+        assert where[name]["sr"].difference == pytest.approx(100 * (means[0] - means[1]), abs=1e-3)
+    table = replace(TABLE, references=("object", "hoz"))
+    text = table_text(table, TINY, summaries, "command", {})
+    interval = where["bathroom"]["spl"]
+    line = next(line for line in text.split("SPL by scene and L*")[1].splitlines() if line.startswith("| hoz "))
+    assert f"{interval.difference:+.1f} [{interval.low:+.1f}, {interval.high:+.1f}]" in line
+    assert "| random" not in text.split("SR by scene and L*")[1].split("## Differences from hoz")[0]
+
+
+def test_outcomes_of_one_scene_are_not_divided_by_scene() -> None:
+    one = replace(make_outcome(), rooms=("kitchen/26", "kitchen/27"))
+    where = summarise({"hoz": {0: one}, "object": {0: one}}, ["hoz"])["object"].where
+    assert all(name.startswith("L* ") for name in where)
 
 
 def test_an_unfinished_table_says_what_it_lacks(outcomes: dict[str, dict[int, Outcome]]) -> None:

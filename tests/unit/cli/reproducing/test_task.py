@@ -1,5 +1,6 @@
 import json
 from dataclasses import replace
+from importlib import metadata
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -51,12 +52,14 @@ def test_candidates_are_the_last_that_differ_and_the_end_among_them(tmp_path: Pa
 
 
 @pytest.mark.usefixtures("benchmark")
-def test_a_result_tells_the_time_of_the_whole_training_and_that_to_the_checkpoint(tmp_path: Path, job: Job) -> None:
+def test_a_result_tells_what_it_is_of(tmp_path: Path, job: Job) -> None:
     choice = job.choice(tmp_path)
     choice.write_text(json.dumps({"checkpoint": "0001-000000020.safetensors", "seconds": 1.0}))
     reproduce_task._test(job, Place(tmp_path, tmp_path), lambda _: None)
     facts = Outcome.load(job.result(tmp_path)).facts
     assert (facts["frames"], facts["seconds_to_chosen"], facts["training_seconds"]) == (2000, 20.0, 40.0)
+    assert facts["epochs"] == 3  # so that a reader knows that the run was interrupted
+    assert facts["libraries"]["torch"] == metadata.version("torch")
 
 
 @pytest.mark.usefixtures("benchmark")
