@@ -111,7 +111,7 @@ def _verdicts(compared: Sequence[Row], reference: str, summaries: Mapping[str, R
             if row.agent not in BASELINES:
                 interval = summaries[row.name].differences[reference].get("long", {}).get(metric)
                 known = None if _of_one_seed(row, reference, summaries) else interval
-                verdicts.setdefault(_verdict(known), []).append(row.name)
+                verdicts.setdefault(_verdict(known), []).append(f"`{row.name}`")
         if verdicts:
             text = "; ".join(
                 f"{verdict}: {', '.join(verdicts[verdict])}" for verdict in _VERDICTS if verdict in verdicts

@@ -91,7 +91,7 @@ def test_markdown_has_rows_intervals_and_the_papers_figures(outcomes: dict[str, 
 def test_comparisons_of_one_training_are_told(outcomes: dict[str, dict[int, Outcome]]) -> None:
     del outcomes["object"][1]
     text = table_text(TABLE, TINY, summarise(outcomes, TABLE.references), "command", {})
-    assert "- SR of episodes with L* >= 5, against hoz: of one seed, so not judged: object." in text
+    assert "- SR of episodes with L* >= 5, against hoz: of one seed, so not judged: `object`." in text
     assert "| object † |" in text
     assert "† One seed" in text
 
@@ -107,9 +107,9 @@ def test_rows_are_judged_by_their_intervals_and_baselines_are_not() -> None:
     table = replace(TABLE, rows=rows, references=references)
     agents = {name: "object" if name == "same" else name for name in outcomes}
     text = table_text(table, TINY, summarise(outcomes, references, agents), "command", {})
-    judged = "better: hoz; alike within 2 points: same; not told apart: near."
+    judged = "better: `hoz`; alike within 2 points: `same`; not told apart: `near`."
     assert f"- SR of episodes with L* >= 5, against object: {judged}" in text
-    assert "against hoz: worse: object, same, near." in text
+    assert "against hoz: worse: `object`, `same`, `near`." in text
 
 
 def test_the_same_agents_are_compared_seed_by_seed_and_others_are_not() -> None:
