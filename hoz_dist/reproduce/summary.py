@@ -2,17 +2,15 @@
 
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hoz_dist.errors import InvalidValueError
+from hoz_dist.evaluation.success_by_length import LENGTHS
 from hoz_dist.reproduce.bootstrap import Interval, Resampling
 from hoz_dist.reproduce.outcome import METRICS, Outcome
-
-LENGTHS: Final = (1, 5, 10, 15, 20, 30)
-"""Least L* of each group of episodes; the last one is open. Groups without episodes are left out."""
 
 
 @dataclass(frozen=True)
