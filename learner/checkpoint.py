@@ -98,6 +98,11 @@ class Checkpoint:
     seen: list[list[object]]
     """The table that tells repeated pushes."""
 
+    @property
+    def file_name(self) -> str:
+        """What its file is called in a folder of checkpoints."""
+        return f"{self.epoch:04d}-{self.version:09d}{SUFFIX}"
+
     def scene_graphs(self) -> dict[str, SceneGraph]:
         """Return the scene graphs, rebuilt from the room graphs."""
         scenes: dict[str, list[RoomGraph]] = {}
@@ -163,7 +168,7 @@ def save_checkpoint(folder: Path, checkpoint: Checkpoint, *, keep: bool = False,
     tensors = _tensors_of(checkpoint)
     text = json.dumps(_values_of(checkpoint), sort_keys=True)
     metadata = {"hoz": text, "digest": _digest(text, tensors)}
-    path = folder / f"{checkpoint.epoch:04d}-{checkpoint.version:09d}{SUFFIX}"
+    path = folder / checkpoint.file_name
     try:
         files.replace(path, lambda temporary: save_file(tensors, temporary, metadata))
     except SafetensorError as error:
@@ -190,7 +195,7 @@ def load_checkpoint(path: Path) -> Checkpoint:
     with reading(path):
         if not path.is_dir():
             return _load_file(path)
-        folder = path / FOLDER if (path / FOLDER).is_dir() else path
+        folder = _folder_of(path)
     checkpoint, damaged = newest_readable(folder)
     for failure in damaged.values():
         _log.warning("%s", failure)
@@ -250,7 +255,7 @@ def kept_checkpoints(run: Path, *, with_newest: bool = False) -> tuple[Path, ...
     did not go on from is left out.
 
     Args:
-        run: The run folder.
+        run: The run folder, or its folder of checkpoints.
         with_newest: Also the newest, which is not marked when everything was killed right after it was written.
 
     Raises:
@@ -258,11 +263,16 @@ def kept_checkpoints(run: Path, *, with_newest: bool = False) -> tuple[Path, ...
     """
     kept: list[tuple[Stamp, Path]] = []
     with reading(run):
-        for stamp, file in _stamped(run / FOLDER):  # the newest first
+        for stamp, file in _stamped(_folder_of(run)):  # the newest first
             wanted = file.with_suffix(KEPT_SUFFIX).exists() or (with_newest and not kept)
             if wanted and (not kept or stamp.version < kept[-1][0].version):
                 kept.append((stamp, file))
     return tuple(file for _, file in reversed(kept))
+
+
+def _folder_of(run: Path) -> Path:
+    """Return the folder of checkpoints of a run; the folder itself when there is none in it."""
+    return run / FOLDER if (run / FOLDER).is_dir() else run
 
 
 def _stamped(folder: Path) -> list[tuple[Stamp, Path]]:

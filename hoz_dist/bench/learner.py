@@ -16,6 +16,7 @@ from hoz_dist.bench.timing import Contender, Progress, core_seconds, rate, run_c
 from hoz_dist.config import Compression, RunConfig
 from hoz_dist.policy.parameters import initial_parameters
 from hoz_dist.policy.settings import Preset
+from hoz_dist.policy.threads import use_one_thread
 from hoz_dist.wire.protocol.answers import Accepted
 from hoz_dist.wire.protocol.codec import checksum, decode, encode
 from hoz_dist.wire.protocol.pushes import GradientPush
@@ -56,7 +57,7 @@ def bench_learner(
         repeats: Measurements of each figure.
         progress: Told how far the work is.
     """
-    torch.set_num_threads(1)
+    use_one_thread()
     cases = [(preset, codec) for preset in presets for codec in codecs]
     samples = run_contests([partial(_applying, *case, seconds) for case in cases], repeats, progress)
     metrics = {}

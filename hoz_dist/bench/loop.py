@@ -6,12 +6,12 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
-import torch
 
 from hoz_dist.config import RunConfig
 from hoz_dist.evaluation.loading import matching_encoder
 from hoz_dist.nav.rooms import RoomId
 from hoz_dist.policy.parameters import initial_parameters
+from hoz_dist.policy.threads import use_one_thread
 from hoz_dist.sim.batch_env import BatchEnv
 from hoz_dist.sim.view_store import ViewStore
 from hoz_dist.stages import StageClock
@@ -45,7 +45,7 @@ def train_in_process(
         ready: Called before the rooms are got ready.
         stopped: Waits some seconds for the word to stop, and tells whether it came.
     """
-    torch.set_num_threads(1)
+    use_one_thread()
     os.setsid()  # as actors have one each: Linux divides processors between sessions first
     clock = StageClock()
     adam = FlatAdam(initial_parameters(config.policy, config.seed), config.learning_rate)

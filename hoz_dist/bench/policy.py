@@ -21,6 +21,7 @@ from hoz_dist.policy.navigator import Guidance
 from hoz_dist.policy.parameters import FlatParameters, make_policy
 from hoz_dist.policy.settings import Precision, Preset
 from hoz_dist.policy.tape import dtype_of
+from hoz_dist.policy.threads import use_one_thread
 
 ACTING_BATCHES: Final = (1, 64)
 TRAINING_BATCHES: Final = (16, 64)
@@ -43,7 +44,7 @@ def bench_policy(
         repeats: Measurements of each figure.
         progress: Told how far the work is.
     """
-    torch.set_num_threads(1)
+    use_one_thread()
     contests: dict[str, Contest] = {}
     for preset in presets:
         for batch in ACTING_BATCHES:

@@ -89,9 +89,8 @@ def actor_command(
         open_client(connect, CONNECT_S, stop, credentials, shared_memory=memory.on) as session,
     ):
         # Only now, that somebody answers: these take seconds to import.
-        import torch
-
         from hoz_dist.evaluation.loading import matching_encoder
+        from hoz_dist.policy.threads import use_one_thread
         from hoz_dist.sim.live import LiveViews
         from hoz_dist.sim.view_source import StoredViews
         from hoz_dist.sim.view_store import ViewStore, default_cache
@@ -100,8 +99,7 @@ def actor_command(
         from workers.link import LearnerLink
         from workers.timings import Timings
 
-        # A process is one thread: actors share the cores, and one thread adds up the same way every time.
-        torch.set_num_threads(1)
+        use_one_thread()
         clock = StageClock()
         with ExitStack() as stack:
             book = stack.enter_context(Journal(journal)) if journal is not None else None

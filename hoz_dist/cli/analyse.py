@@ -3,18 +3,17 @@
 import json
 from collections import Counter
 from collections.abc import Iterable, Mapping
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from hoz_dist.cli.options import cache_option, trial_options, weights_option
+from hoz_dist.cli.options import cache_option, echo_json, trial_options, weights_option
 from hoz_dist.errors import InvalidValueError
 
 if TYPE_CHECKING:
-    from hoz_dist.cli.trace_runs import TracedRuns
-    from hoz_dist.evaluation.analysis import Analysis
-    from hoz_dist.evaluation.learning_curve import LearningCurve
+    from hoz_dist.cli.analysing.tracing import TracedRuns
 
 
 @click.command("analyse")
@@ -24,7 +23,8 @@ if TYPE_CHECKING:
 @click.option(
     "--curve",
     is_flag=True,
-    help="Also measure each checkpoint that a run folder keeps, for frames to SR 50 and 70; in validation rooms only.",
+    help="Also measure each checkpoint that a run folder keeps, by the same trials, for frames to SR 50 and 70; in "
+    "validation rooms only.",
 )
 @click.option("--out", type=click.Path(file_okay=False, path_type=Path), help="Folder for pictures and analysis.json.")
 @weights_option
@@ -49,14 +49,16 @@ def analyse_command(
 
     RUN is a checkpoint file, or a run folder for its newest checkpoint; `reproduce` tests another one, which
     seed-N.choice-*.json beside the folder names. Runs that differ by their seed alone count as one method. All of them
-    run the same fixed episodes at temperature 0.5, with Random and Oracle beside them. docs/analysis.md explains each
-    figure.
+    run the same fixed episodes at the temperature that `evaluate` has by default, with Random and Oracle beside them.
+    docs/analysis.md explains each figure.
     """
     if curve and split == "test":
         message = "--curve compares checkpoints, which is for validation rooms; leave out --curve or --split test."
         raise InvalidValueError(message)
+    from hoz_dist.cli.analysing.results import results_of
+    from hoz_dist.cli.analysing.runs import open_runs
+    from hoz_dist.cli.analysing.tracing import trace_runs
     from hoz_dist.cli.consoles import result_console
-    from hoz_dist.cli.trace_runs import open_runs, trace_runs
     from hoz_dist.evaluation.analysis_table import analysis_table
 
     opened = open_runs(
@@ -68,22 +70,23 @@ def analyse_command(
         cache=cache,
         with_kept=curve,
     )
-    traced = trace_runs(opened, range(seed, seed + trials))
-    results = _results(traced, split)
+    seeds = range(seed, seed + trials)
+    traced = trace_runs(opened, seeds)
+    results = results_of(opened, traced, episodes, seeds)
     rooms = f"{'validation' if split == 'val' else 'test'} rooms"
     if out is not None:
         _draw(traced, out, results, rooms)
     if as_json:
-        click.echo(json.dumps(results, indent=2))
+        echo_json(results)
         return
     shown = [analysis.long if only_long else analysis for analysis in traced.analyses]
-    seeds = f"seed {seed}" if trials == 1 else f"seeds {seed} to {seed + trials - 1}"
+    drawn = f"seed {seed}" if trials == 1 else f"seeds {seed} to {seeds[-1]}"
     table = analysis_table(
         [analysis for analysis in shown if analysis is not None],
         traced.curves,
         title=f"{len(traced.benchmark.episodes)} episodes on unseen {rooms}"
         + (", those with L* >= 5" if only_long else "")
-        + f"; runs: {_counts(run.method for run in opened)}; trials of each: {trials} ({seeds})",
+        + f"; runs: {_counts(run.method for run in opened)}; trials of each: {trials} ({drawn})",
         caption="docs/analysis.md explains each figure",
     )
     result_console().print(table)
@@ -94,26 +97,9 @@ def _counts(methods: Iterable[str]) -> str:
     return ", ".join(f"{name} {runs}" for name, runs in Counter(methods).items())
 
 
-def _results(traced: "TracedRuns", split: str) -> dict[str, Any]:
-    def parts(analysis: "Analysis") -> dict[str, Any]:
-        return {"all": analysis.to_json(), "long": None if analysis.long is None else analysis.long.to_json()}
-
-    return {
-        "split": split,
-        "methods": {analysis.name: parts(analysis) for analysis in traced.analyses},
-        "curves": {name: [_curve(curve) for curve in curves] for name, curves in traced.curves.items()},
-    }
-
-
-def _curve(curve: "LearningCurve") -> dict[str, Any]:
-    from hoz_dist.evaluation.analysis_table import MILESTONES
-    from hoz_dist.evaluation.learning_curve import frames_to
-
-    return {**curve._asdict(), "frames_to": {f"{rate:.0f}": frames_to(curve, rate) for rate in MILESTONES}}
-
-
 def _draw(traced: "TracedRuns", folder: Path, results: Mapping[str, Any], rooms: str) -> None:
     from hoz_dist.atomic import replace_file, write_atomically
+    from hoz_dist.cli.analysing.side_by_side import MOST_AGENTS, side_by_side
     from hoz_dist.viz.analysis import failure_figure, learning_figure, length_figure
     from hoz_dist.viz.trajectory import draw_trajectories
     from hoz_dist.viz.zones import png
@@ -125,7 +111,7 @@ def _draw(traced: "TracedRuns", folder: Path, results: Mapping[str, Any], rooms:
         figures["learning-curves"] = learning_figure(traced.curves)
     for name, figure in figures.items():
         write_atomically(folder / f"{name}.png", png(figure), overwrite=True)
-    ways = traced.side_by_side()
-    columns = len(traced.shown)
-    replace_file(folder / "trajectories.png", lambda temporary: draw_trajectories(ways, temporary, columns))
+    shown = dict(islice(traced.shown.items(), MOST_AGENTS))
+    ways = side_by_side(traced.benchmark, shown)
+    replace_file(folder / "trajectories.png", lambda temporary: draw_trajectories(ways, temporary, len(shown)))
     write_atomically(folder / "analysis.json", f"{json.dumps(results, indent=2)}\n".encode(), overwrite=True)

@@ -1,11 +1,11 @@
 """`hoz-dist evaluate`: measure a checkpoint on rooms that it was not trained in."""
 
-import json
 from pathlib import Path
 
 import click
 
-from hoz_dist.cli.options import cache_option, trial_options, weights_option
+from hoz_dist.cli.options import cache_option, echo_json, trial_options, weights_option
+from hoz_dist.evaluation.protocol import TEMPERATURE
 
 
 @click.command("evaluate")
@@ -14,7 +14,7 @@ from hoz_dist.cli.options import cache_option, trial_options, weights_option
 @click.option(
     "--temperature",
     type=click.FloatRange(0.01, 10.0),
-    default=0.5,
+    default=TEMPERATURE,
     show_default=True,
     help="Logits are divided by it before actions are drawn: 1 draws as in training, 0.01 takes the likeliest.",
 )
@@ -58,6 +58,6 @@ def evaluate_command(
         live=live,
     ).comparison
     if as_json:
-        click.echo(json.dumps(comparison.to_json(), indent=2))
+        echo_json(comparison.to_json())
     else:
         Console().print(comparison_table(comparison))

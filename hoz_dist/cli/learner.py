@@ -119,11 +119,10 @@ def learner_command(
     credentials, name = _identity(keys, name, role="router" if connect is None else "learner")
     config = run_config(choices) if config_file is None else _config_in(config_file)
 
-    import torch
-
+    from hoz_dist.policy.threads import use_one_thread
     from learner.service import LearnerSettings, serve
 
-    torch.set_num_threads(1)  # Actors share the cores, and one thread adds up the same way every time.
+    use_one_thread()
     settings = LearnerSettings(
         listen=listen,
         connect=connect,

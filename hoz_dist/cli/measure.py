@@ -10,14 +10,16 @@ from pathlib import Path
 from typing import NamedTuple
 
 from hoz_dist.cli.progress import Progress
-from hoz_dist.cli.rendering import Encoding, render_rooms
+from hoz_dist.cli.rendering import Encoding, render_missing
 from hoz_dist.errors import NotFoundError
-from hoz_dist.evaluation.agents import TEMPERATURE, PolicyAgent
+from hoz_dist.evaluation.agents import PolicyAgent
 from hoz_dist.evaluation.benchmark import Benchmark, Comparison, compare
 from hoz_dist.evaluation.loading import load_agent, matching_encoder
+from hoz_dist.evaluation.protocol import TEMPERATURE
 from hoz_dist.evaluation.trials import stored_views
 from hoz_dist.nav.categories import SCENES, scene_index
 from hoz_dist.nav.rooms import Split, rooms_of
+from hoz_dist.policy.threads import use_one_thread
 from hoz_dist.sim.live import LiveViews
 from hoz_dist.sim.view_store import ViewStore, default_cache
 from learner.checkpoint import Checkpoint
@@ -65,11 +67,8 @@ def open_benchmark(
     folder = cache or default_cache()
     store = ViewStore(folder, config.picture_size)
     names = [room for scene in wanted for room in rooms_of(scene, split)]
-    missing = [room for room in names if not store.holds(room, encoder)]
-    if missing:
-        render_rooms(
-            missing, folder, config.picture_size, len(os.sched_getaffinity(0)), Encoding(config.encoder, weights)
-        )
+    jobs = len(os.sched_getaffinity(0))
+    render_missing(names, folder, config.picture_size, jobs, Encoding(config.encoder, weights))
     return Benchmark.of([store.open(room, encoder) for room in names], split, episodes)
 
 
@@ -110,10 +109,7 @@ def measure(
     Raises:
         HozError: A scene does not exist, the checkpoint holds no scene, or its parts do not fit.
     """
-    import torch
-
-    # Results do not depend on the number of cores, and small products gain nothing from more threads.
-    torch.set_num_threads(1)
+    use_one_thread()
     config = checkpoint.config
     agent = agent_of(checkpoint, temperature)
     benchmark = open_benchmark(checkpoint, split=split, episodes=episodes, scenes=scenes, weights=weights, cache=cache)

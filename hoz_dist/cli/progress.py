@@ -136,6 +136,14 @@ class Progress:
             self._printed = now
             self._print()
 
+    def say(self, line: str) -> None:
+        """Print a line that stays, above the bar on a terminal.
+
+        Args:
+            line: The line, shown as it is.
+        """
+        self._console.print(line, markup=False, highlight=False, soft_wrap=True)
+
     def _print(self) -> None:
-        self._console.print(f"{self._title}  {self._last}", markup=False, highlight=False, soft_wrap=True)
+        self.say(f"{self._title}  {self._last}")
         self._last = ""

@@ -2,7 +2,6 @@
 
 import io
 import multiprocessing
-import signal
 from collections.abc import Iterable, Sequence
 from multiprocessing.process import BaseProcess
 from multiprocessing.queues import Queue, SimpleQueue
@@ -13,6 +12,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from hoz_dist.cli.progress import Progress
+from hoz_dist.cli.spawning import start_shielded
 from hoz_dist.errors import HozError, InvalidValueError
 from hoz_dist.nav.pose import GRID_M, YAWS, Pose
 from hoz_dist.nav.rooms import RoomId
@@ -72,14 +72,7 @@ def render_rooms(rooms: Sequence[RoomId], cache: Path, picture_size: int, jobs: 
         tasks.put(task)
     arguments = (tasks, reports, cache, picture_size, encoding)
     workers = [context.Process(target=_render, args=arguments, daemon=True) for _ in range(count)]
-    # Ctrl-C reaches every process of the terminal, and this one acts on it. Processes start with their parent's mask,
-    # so that it cannot hit one in the midst of its imports.
-    mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        for worker in workers:
-            worker.start()
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+    start_shielded(workers)
     try:
         return _follow(workers, reports, len(rooms))
     finally:
@@ -88,6 +81,40 @@ def render_rooms(rooms: Sequence[RoomId], cache: Path, picture_size: int, jobs: 
             worker.terminate()
         for worker in workers:
             worker.join()
+
+
+def missing_rooms(rooms: Iterable[RoomId], cache: Path, picture_size: int, encoding: Encoding) -> list[RoomId]:
+    """Return those rooms of which the view cache lacks something.
+
+    Args:
+        rooms: The rooms.
+        cache: The view cache.
+        picture_size: Side of the pictures, pixels.
+        encoding: The encoder.
+
+    Raises:
+        HozError: The encoder cannot be loaded.
+    """
+    encoder, store = load_encoder(*encoding), ViewStore(cache, picture_size)
+    return [room for room in rooms if not store.holds(room, encoder)]
+
+
+def render_missing(rooms: Iterable[RoomId], cache: Path, picture_size: int, jobs: int, encoding: Encoding) -> None:
+    """Do as `render_rooms` does, but start no process for rooms that the cache has.
+
+    Args:
+        rooms: The rooms, each once.
+        cache: The view cache.
+        picture_size: Side of the pictures, pixels.
+        jobs: Processes that render at once.
+        encoding: The encoder.
+
+    Raises:
+        HozError: The cache cannot be written, a process was killed, or the encoder cannot be loaded.
+    """
+    missing = missing_rooms(rooms, cache, picture_size, encoding)
+    if missing:
+        render_rooms(missing, cache, picture_size, jobs, encoding)
 
 
 def contact_sheet(rooms: Iterable[RoomId], store: ViewStore) -> bytes:
@@ -158,7 +185,11 @@ def _follow(workers: Sequence[BaseProcess], reports: "Queue[_Report]", rooms: in
                 report = reports.get(timeout=_POLL_S)
             except Empty:
                 if any(worker.exitcode not in {None, 0} for worker in workers):
-                    message = "A rendering process was killed, perhaps for want of memory; try again with fewer --jobs."
+                    # Commands without --jobs render, too, and those that have it may mean runs by it.
+                    message = (
+                        "A rendering process was killed, perhaps for want of memory; render one room at a time by "
+                        "'hoz-dist scenes render --jobs 1', which keeps what is ready, and try again."
+                    )
                     raise InvalidValueError(message) from None
                 continue
             if report.error:

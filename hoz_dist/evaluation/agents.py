@@ -1,12 +1,13 @@
 """The agents that can be evaluated: a trained policy, the floor (Random) and the ceiling (Oracle)."""
 
-from typing import Final, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from hoz_dist.evaluation.protocol import TEMPERATURE
 from hoz_dist.graph.planner import target_zone
 from hoz_dist.nav.actions import Action
 from hoz_dist.policy.actor_critic import ActorCritic
@@ -16,9 +17,6 @@ from hoz_dist.policy.state import Decision
 from hoz_dist.sim.episode_runner import EpisodeRunner
 from hoz_dist.sim.expert import expert_actions
 from hoz_dist.sim.room_views import RoomViews
-
-TEMPERATURE: Final = 0.5
-"""By which a tested policy's logits are divided: exploring is for training; see docs/decisions/recipe.md."""
 
 
 class ZonePlan(NamedTuple):

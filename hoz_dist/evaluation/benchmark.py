@@ -2,18 +2,16 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any
 
 from hoz_dist.evaluation.agents import Agent, OracleAgent, PolicyAgent, RandomAgent
+from hoz_dist.evaluation.protocol import EPISODE_SEED
 from hoz_dist.evaluation.trials import Evaluation, SourceFactory, run_trials, stored_views
 from hoz_dist.nav.categories import SCENES
 from hoz_dist.nav.episode import Episode
 from hoz_dist.nav.rooms import Split
 from hoz_dist.sim.episodes import episode_list
 from hoz_dist.sim.room_views import RoomViews
-
-EPISODE_SEED: Final = 2021
-"""Seed of the list of episodes: the same list for every agent, trial and run."""
 
 
 @dataclass(frozen=True)

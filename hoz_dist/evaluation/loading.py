@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 
 from hoz_dist.config import RunConfig
 from hoz_dist.errors import InvalidValueError, NotFoundError
-from hoz_dist.evaluation.agents import TEMPERATURE, PolicyAgent
+from hoz_dist.evaluation.agents import PolicyAgent
+from hoz_dist.evaluation.protocol import TEMPERATURE
 from hoz_dist.graph.scene_graph import SceneGraph
 from hoz_dist.nav.encoder import VisualEncoder
 from hoz_dist.policy.encoders import load_encoder

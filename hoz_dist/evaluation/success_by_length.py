@@ -37,8 +37,9 @@ class LengthBin(NamedTuple):
 def success_by_length(trials: Sequence[Sequence[EpisodeAnalysis]], lengths: Sequence[int] = LENGTHS) -> list[LengthBin]:
     """Bin episodes by L*; bins without episodes are left out.
 
-    Trials repeat the same episodes and so tell little about others: an episode counts once, with its mean success. That
-    makes the intervals wider rather than narrower than they have to be.
+    Trials repeat the same episodes and so tell little about others: an episode counts once, with its mean success. The
+    intervals take episodes as independent and leave out how rooms and trainings differ; where these do, the intervals
+    are too narrow.
 
     Args:
         trials: Trials of the same episodes in the same order.

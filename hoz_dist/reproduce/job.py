@@ -11,13 +11,12 @@ A job is known by digests of everything that shapes it, so a table finds what an
 import hashlib
 import json
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final
 
 from hoz_dist.config import RunConfig
-from hoz_dist.evaluation.agents import TEMPERATURE
-from hoz_dist.evaluation.benchmark import EPISODE_SEED
+from hoz_dist.evaluation.protocol import EPISODE_SEED, TEMPERATURE
 from hoz_dist.nav.categories import scenes_to_tell
 from hoz_dist.nav.reward import STEP_REWARD, SUCCESS_REWARD
 from hoz_dist.nav.rooms import RoomId, Split, rooms_of, training_rooms
@@ -98,6 +97,8 @@ class Protocol:
 class Job:
     """What a row takes for one seed: a training, which other jobs may share, and a test of its own."""
 
+    row: str = field(compare=False)
+    """Name of the row, for people; jobs of several rows may be the same."""
     agent: str
     training: Training | None
     """None for agents that are not trained."""
@@ -144,6 +145,12 @@ class Task:
     training: Training | None
     jobs: tuple[Job, ...]
 
+    @property
+    def name(self) -> str:
+        """Which agent it is about, for people; that of the first row when several share the training."""
+        job = self.jobs[0]
+        return job.row if self.training is None else f"{job.row}, seed {job.seed}"
+
     def waiting(self, out: Path) -> tuple[Job, ...]:
         """Return the jobs that have no result yet."""
         return tuple(job for job in self.jobs if not job.result(out).exists())
@@ -172,21 +179,19 @@ def jobs_of(table: Table, row: Row, budget: Budget, seeds: Sequence[int] | None 
         1 if row.agent == "oracle" else budget.trials,
     )
     if row.agent in BASELINES:
-        return (Job(row.agent, None, protocol),)
+        return (Job(row.name, row.agent, None, protocol),)
     wanted = seeds_of(row, budget) if seeds is None else seeds
     frames = budget.frames(table.scenes)
     recipe = RunConfig(preset="medium", frames=frames, approach_frames=frames, scenes=scenes_to_tell(scenes))
     config = RunConfig.from_json(recipe.to_json() | {"method": row.agent, **_as_json(row.options)})
+    trainings = (Training(replace(config, seed=seed), table.scenes, budget.checkpoints) for seed in wanted)
     tested_with = tuple(sorted(row.tested_with.items()))
-    return tuple(
-        Job(row.agent, Training(replace(config, seed=seed), table.scenes, budget.checkpoints), protocol, tested_with)
-        for seed in wanted
-    )
+    return tuple(Job(row.name, row.agent, training, protocol, tested_with) for training in trainings)
 
 
 def seeds_of(row: Row, budget: Budget) -> range:
     """Return the seeds that a budget has a row trained with."""
-    return range(budget.key_seeds if row.key else budget.seeds)
+    return range(budget.more_seeds if row.more_seeds else budget.seeds)
 
 
 def tasks_of(jobs: Iterable[Job], out: Path) -> tuple[Task, ...]:
@@ -201,9 +206,20 @@ def tasks_of(jobs: Iterable[Job], out: Path) -> tuple[Task, ...]:
     groups: dict[Path, dict[Path, Job]] = {}
     for job in jobs:
         place = job.result(out) if job.training is None else job.training.folder(out)
-        groups.setdefault(place, {})[job.result(out)] = job
+        groups.setdefault(place, {}).setdefault(job.result(out), job)
     tasks = [Task(next(iter(group.values())).training, tuple(group.values())) for group in groups.values()]
     return tuple(sorted(tasks, key=lambda task: task.jobs[0].seed))
+
+
+def rooms_needed(tasks: Iterable[Task]) -> list[RoomId]:
+    """Return the rooms that tasks train, choose and test in, each once."""
+    rooms: dict[RoomId, None] = {}
+    for task in tasks:
+        if task.training is not None:
+            rooms |= dict.fromkeys(training_rooms(task.training.scenes))
+        for job in task.jobs:
+            rooms |= dict.fromkeys((*job.protocol.rooms("val"), *job.protocol.rooms("test")))
+    return list(rooms)
 
 
 def _as_json(options: Mapping[str, Any]) -> dict[str, Any]:

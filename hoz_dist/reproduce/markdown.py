@@ -8,7 +8,7 @@ from hoz_dist.reproduce.bootstrap import CONFIDENCE, REPLICATES, Interval
 from hoz_dist.reproduce.budget import Budget
 from hoz_dist.reproduce.outcome import METRICS
 from hoz_dist.reproduce.row import BASELINES, Figures, Paper, Row, Table
-from hoz_dist.reproduce.summary import RowSummary, Spread
+from hoz_dist.reproduce.summary import RowSummary, Spread, of_one_seed
 
 _NOTHING: Final = "-"
 _METRICS: Final = ("SR", "SPL", "SAE", "SR, L>=5", "SPL, L>=5", "SAE, L>=5")
@@ -59,7 +59,7 @@ def table_text(
             lines += ["", f"## Differences from {reference}", "", *_verdicts(compared, reference, summaries), ""]
             lines += _differences(compared, reference, summaries)
             lines += ["", _kind(compared, reference, summaries)]
-            lines += _where(compared, summaries) if reference == table.references[0] else []
+            lines += _where(compared, reference, summaries) if reference == table.references[0] else []
     return "\n".join([*lines, ""])
 
 
@@ -76,11 +76,12 @@ def _unfinished(table: Table, unfinished: Mapping[str, tuple[int, int]]) -> str:
 def _protocol(table: Table, budget: Budget, summaries: Mapping[str, RowSummary], command: str) -> str:
     one = next(iter(summaries.values()))
     frames = budget.frames(table.scenes) / 1e6
+    single = ", of Oracle one" if any(row.agent == "oracle" for row in table.rows) else ""
     return (
         f"`{command}`: {frames:g}M frames for each training run; the checkpoint was chosen among the last "
         f"{budget.candidates} of {budget.checkpoints} on validation rooms. {one.episodes['all']} episodes in test rooms"
-        f", {one.episodes.get('long', 0)} of them with L* >= 5; {budget.trials} trials. Percent; ± is the standard "
-        "deviation over seeds, of rows without several that over trials. The paper's figures are of AI2-THOR."
+        f", {one.episodes.get('long', 0)} of them with L* >= 5; {budget.trials} trials{single}. Percent; ± is the "
+        "standard deviation over seeds, of rows without several that over trials. The paper's figures are of AI2-THOR."
     )
 
 
@@ -110,7 +111,7 @@ def _verdicts(compared: Sequence[Row], reference: str, summaries: Mapping[str, R
         for row in compared:
             if row.agent not in BASELINES:
                 interval = summaries[row.name].differences[reference].get("long", {}).get(metric)
-                known = None if _of_one_seed(row, reference, summaries) else interval
+                known = None if of_one_seed(row, reference, summaries) else interval
                 verdicts.setdefault(_verdict(known), []).append(f"`{row.name}`")
         if verdicts:
             text = "; ".join(
@@ -131,30 +132,37 @@ def _verdict(interval: Interval | None) -> str:
     return _ALIKE if interval.low >= -_ALIKE_PP and interval.high <= _ALIKE_PP else _UNKNOWN
 
 
-def _where(compared: Sequence[Row], summaries: Mapping[str, RowSummary]) -> list[str]:
+def _where(compared: Sequence[Row], reference: str, summaries: Mapping[str, RowSummary]) -> list[str]:
     """Write the differences from the first reference by scene and by L*."""
     rows = [row for row in compared if row.agent not in BASELINES and summaries[row.name].where]
     if not rows:
         return []
-    groups = list(summaries[rows[0].name].where)
-    lines = []
+    first = summaries[rows[0].name]
+    groups = list(first.where)
+    header = [f"{group} ({first.episodes[group]})" for group in groups]
+    lines = ["", "By scene and L*; the number of episodes stands in brackets, and ranges with few are left out."]
     for metric in _JUDGED:
-        cells = [[row.name, *(_interval(summaries[row.name].where[group][metric]) for group in groups)] for row in rows]
-        lines += ["", *aligned([f"{metric.upper()} by scene and L*", *groups], cells)]
+        cells = [
+            [
+                _marked(row, reference, summaries),
+                *(_interval(summaries[row.name].where[group][metric]) for group in groups),
+            ]
+            for row in rows
+        ]
+        lines += ["", *aligned([metric.upper(), *header], cells)]
     return lines
 
 
-def _of_one_seed(row: Row, reference: str, summaries: Mapping[str, RowSummary]) -> bool:
-    """Tell whether an interval leaves out how much another training would differ."""
-    trained = [name for name in (row.name, reference) if not (name == row.name and row.agent in BASELINES)]
-    return min(len(summaries[name].seeds) for name in trained) == 1
+def _marked(row: Row, reference: str, summaries: Mapping[str, RowSummary]) -> str:
+    """Return a row's name, with a mark when its intervals leave out how much another training would differ."""
+    return f"{row.name} {_ONE_SEED}" if of_one_seed(row, reference, summaries) else row.name
 
 
 def _differences(compared: Sequence[Row], reference: str, summaries: Mapping[str, RowSummary]) -> list[str]:
     cells = []
     for row in compared:
         parts = summaries[row.name].differences[reference]
-        line = [f"{row.name} {_ONE_SEED}" if _of_one_seed(row, reference, summaries) else row.name]
+        line = [_marked(row, reference, summaries)]
         for part in ("all", "long"):
             line += [_interval(parts.get(part, {}).get(metric)) for metric in METRICS]
         cells.append(line)
@@ -165,10 +173,10 @@ def _kind(compared: Sequence[Row], reference: str, summaries: Mapping[str, RowSu
     """Say what the intervals are of."""
     text = (
         f"Row minus {reference} in percent points, with {CONFIDENCE:.0%} intervals: {REPLICATES} bootstrap replicates "
-        "over seeds, test rooms and episodes, always the same rooms and episodes for both. When an interval is without "
-        "0, the sign of the difference is unlikely to be chance of seeds or rooms; few seeds make intervals wide."
+        "over seeds, test rooms and episodes, always the same rooms and episodes for both. If an interval excludes 0, "
+        "the sign of the difference is unlikely to be due to the choice of seeds or rooms; few seeds make it wide."
     )
-    if any(_of_one_seed(row, reference, summaries) for row in compared):
+    if any(of_one_seed(row, reference, summaries) for row in compared):
         text += f" {_ONE_SEED} One seed, here or there: the interval leaves out how much another training would differ."
     return text
 

@@ -7,8 +7,8 @@ from typing import Final
 import numpy as np
 
 from hoz_dist.config import RunConfig
-from hoz_dist.evaluation.benchmark import EPISODE_SEED
 from hoz_dist.evaluation.loading import load_agent, matching_encoder
+from hoz_dist.evaluation.protocol import EPISODE_SEED
 from hoz_dist.nav.rooms import RoomId, training_rooms
 from hoz_dist.policy.parameters import initial_parameters
 from hoz_dist.reproduce.costs import Speed

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from hoz_dist.reproduce.row import Row, Table
-from hoz_dist.reproduce.summary import RowSummary
+from hoz_dist.reproduce.summary import RowSummary, of_one_seed
 
 _METRICS: Final = ("sr", "spl", "sae")
 _PARTS: Final = ("all", "long")
@@ -61,8 +61,9 @@ def _draw_means(panel: Axes, rows: Sequence[Row], summaries: Mapping[str, RowSum
 def _draw_differences(
     panel: Axes, rows: Sequence[Row], summaries: Mapping[str, RowSummary], reference: str, metric: str
 ) -> None:
-    """Draw every row's difference from a reference in long episodes, with its interval."""
-    panel.set(title=f"{metric.upper()}, L* >= 5, less that of {reference}: percent points, 95%")
+    """Draw every row's difference from a reference in long episodes with its interval, dashed if of one seed."""
+    panel.set(title=f"{metric.upper()}, L* >= 5, less that of {reference}, 95% intervals")
+    panel.set_xlabel(f"percent points; to scale up to {_LINEAR_PP:g}, then logarithmic", fontsize=8)
     panel.title.set_fontsize(8)
     panel.set_xscale("symlog", linthresh=_LINEAR_PP)
     panel.set_xticks(_TICKS_PP, [f"{tick:+d}" if tick else "0" for tick in _TICKS_PP], fontsize=8)
@@ -72,5 +73,7 @@ def _draw_differences(
     for place, row in enumerate(rows):
         interval = summaries[row.name].differences.get(reference, {}).get("long", {}).get(metric)
         if interval is not None:
-            panel.plot((interval.low, interval.high), (place, place), color="C0")
-            panel.plot(interval.difference, place, "o", color="C0", markersize=4)
+            of_one = of_one_seed(row, reference, summaries)
+            panel.plot((interval.low, interval.high), (place, place), "--" if of_one else "-", color="C0")
+            fill = "white" if of_one else "C0"
+            panel.plot(interval.difference, place, "o", color="C0", markerfacecolor=fill, markersize=4)

@@ -38,8 +38,8 @@ class Row:
     """Fields of the run's configuration that are not the default ones."""
     tested_with: Mapping[str, Any] = field(default_factory=dict)
     """Fields of the configuration that are changed after the training, for the test alone."""
-    key: bool = False
-    """Whether others are measured against it, so that it deserves more seeds."""
+    more_seeds: bool = False
+    """Whether it gets the budget's larger number of seeds: a comparison hangs on it."""
     paper: Paper | None = None
     """None when the paper has no such row."""
 

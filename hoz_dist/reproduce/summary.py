@@ -2,7 +2,7 @@
 
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,10 @@ from hoz_dist.errors import InvalidValueError
 from hoz_dist.evaluation.success_by_length import LENGTHS
 from hoz_dist.reproduce.bootstrap import Interval, Resampling
 from hoz_dist.reproduce.outcome import METRICS, Outcome
+from hoz_dist.reproduce.row import BASELINES, Row
+
+_FEWEST_IN_GROUP: Final = 20
+"""Episodes of a group; what fewer of them say is one or two rooms', not a scene's or a length's."""
 
 
 @dataclass(frozen=True)
@@ -30,7 +34,12 @@ class Spread:
 
     def to_json(self) -> dict[str, float | None]:
         """Return JSON values, percent."""
-        return {"mean": _rounded(self.mean), "std": _rounded(self.of_trials), "std_of_seeds": _rounded(self.of_seeds)}
+        return {
+            "mean": _rounded(self.mean),
+            "deviation": _rounded(self.deviation),
+            "std_of_trials": _rounded(self.of_trials),
+            "std_of_seeds": _rounded(self.of_seeds),
+        }
 
 
 @dataclass(frozen=True)
@@ -40,13 +49,13 @@ class RowSummary:
     seeds: tuple[int, ...]
     trials: int
     episodes: Mapping[str, int]
-    """Number of episodes of a trial, by part: all of them, and the long ones, which have L* >= 5."""
+    """Number of episodes of a trial, by part (all of them, and the long ones, which have L* >= 5) and by group."""
     spreads: Mapping[str, Mapping[str, Spread]]
     """By part and metric."""
     differences: Mapping[str, Mapping[str, Mapping[str, Interval]]]
     """Row - reference, percent points, by reference, part and metric; empty when there is nothing to compare with."""
     where: Mapping[str, Mapping[str, Interval]]
-    """Row - first reference, percent points, by group of episodes (scene, range of L*) and metric."""
+    """Row - first reference, percent points, by group of episodes (scene, range of L*) and metric; no small groups."""
     by_scene: Mapping[str, Mapping[str, float]]
     """Means of all episodes, percent, by scene and metric."""
 
@@ -118,7 +127,7 @@ def summarise(
         summaries[name] = RowSummary(
             seeds=tuple(by_seed),
             trials=len(next(iter(by_seed.values())).success),
-            episodes={part: int(mask.sum()) for part, mask in parts.masks.items()},
+            episodes={name: int(mask.sum()) for name, mask in (parts.masks | groups.masks).items()},
             spreads={
                 part: {metric: _spread(100.0 * values[metric][..., mask].mean(axis=-1)) for metric in METRICS}
                 for part, mask in parts.masks.items()
@@ -135,17 +144,23 @@ def summarise(
     return summaries
 
 
+def of_one_seed(row: Row, reference: str, summaries: Mapping[str, RowSummary]) -> bool:
+    """Tell whether a row's intervals against a reference leave out how much another training would differ."""
+    trained = [name for name in (row.name, reference) if not (name == row.name and row.agent in BASELINES)]
+    return min(len(summaries[name].seeds) for name in trained) == 1
+
+
 @dataclass(frozen=True, eq=False)
 class _Comparison:
     """Compares rows in sets of episodes."""
 
-    masks: Mapping[str, NDArray[np.bool_]]
+    masks: dict[str, NDArray[np.bool_]]
     """Which episodes are in each set, [E]."""
     draws: Mapping[str, Resampling]
     """Of each set."""
 
     @classmethod
-    def of(cls, masks: Mapping[str, NDArray[np.bool_]], first: Outcome) -> "_Comparison":
+    def of(cls, masks: dict[str, NDArray[np.bool_]], first: Outcome) -> "_Comparison":
         """Draw once for all comparisons of some sets."""
         return cls(masks, {name: Resampling(first.room[mask], first.scene[mask]) for name, mask in masks.items()})
 
@@ -173,7 +188,7 @@ def _groups(first: Outcome) -> dict[str, NDArray[np.bool_]]:
     for least, following in zip(LENGTHS, (*LENGTHS[1:], None), strict=True):
         name = f"L* {least}+" if following is None else f"L* {least}-{following - 1}"
         groups[name] = (first.optimal >= least) & (True if following is None else first.optimal < following)
-    return {name: mask for name, mask in groups.items() if mask.any()}
+    return {name: mask for name, mask in groups.items() if mask.sum() >= _FEWEST_IN_GROUP}
 
 
 def _values(by_seed: Mapping[int, Outcome]) -> dict[str, NDArray[np.float64]]:

@@ -6,8 +6,11 @@ from typing import Any
 
 import pytest
 
+from hoz_dist import __version__
 from hoz_dist.cli.main import run
 from hoz_dist.config import RunConfig
+from hoz_dist.evaluation.protocol import EPISODE_SEED, TEMPERATURE
+from learner.checkpoint import FOLDER
 from tests.integration.runs import save_run
 
 pytestmark = pytest.mark.integration
@@ -22,7 +25,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for name, config in (
         ("hoz-0", RunConfig(seed=0)),
         ("hoz-1", RunConfig(seed=1)),
-        ("object-0", RunConfig(method="object")),
+        ("object-0", RunConfig(method="object", gradient_norm=0.5)),
     ):
         save_run(folder / name, config, keep=True)
     return folder
@@ -38,7 +41,22 @@ def test_methods_are_analysed_side_by_side_and_drawn(
     paths = [runs / "hoz-0", runs / "object-0", runs / "hoz-1"]
     assert run([*words_for(cache, *paths), "--curve", "--json", "--out", str(tmp_path / "new")]) == 0
     results: dict[str, Any] = json.loads(capsys.readouterr().out)
-    assert results["split"] == "val"
+    assert (results["version"], results["split"]) == (__version__, "val")
+    assert results["parameters"] == {
+        "scenes": ["bathroom"],
+        "episodes_per_scene": EPISODES,
+        "episode_seed": EPISODE_SEED,
+        "trials": 1,
+        "seeds": [0],
+        "temperature": TEMPERATURE,
+    }
+    file, named = next((runs / "hoz-0" / FOLDER).glob("*.safetensors")).name, ("path", "method", "seed", "options")
+    assert {"checkpoint": file, "version": 0, "frames": 0}.items() <= results["runs"][0].items()
+    assert [tuple(of_run[name] for name in named) for of_run in results["runs"]] == [
+        (str(paths[0]), "hoz", 0, {}),
+        (str(paths[1]), "object", 0, {"gradient_norm": 0.5}),
+        (str(paths[2]), "hoz", 1, {}),
+    ]
     assert list(results["methods"]) == ["random", "hoz", "object", "oracle"]
     for name, parts in results["methods"].items():
         figures = parts["all"]
@@ -71,13 +89,31 @@ def test_the_same_figures_as_a_table(runs: Path, cache: Path, capsys: pytest.Cap
     assert "L* 1-4" not in out
 
 
+def test_curves_have_the_same_trials_as_the_runs(runs: Path, cache: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    kept = runs / "object-0" / FOLDER
+    words = ["analyse", str(kept), "--episodes", "60", "--cache", str(cache), "--curve", "--json"]
+    assert run([*words, "--seed", "3", "--trials", "2"]) == 0
+    results: dict[str, Any] = json.loads(capsys.readouterr().out)
+    assert results["parameters"]["seeds"] == [3, 4]
+    # The only checkpoint that the run keeps is its newest one.
+    ((curve,),) = results["curves"].values()
+    assert curve["success"] == [pytest.approx(results["methods"]["object"]["all"]["causes"]["success"])]
+    assert run([*words, "--seed", "0", "--trials", "1"]) == 0
+    assert json.loads(capsys.readouterr().out)["curves"]["object"] != [curve]
+
+
 def test_a_users_mistake_is_one_sentence(
     runs: Path, cache: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     unkept = save_run(tmp_path / "unkept", RunConfig())
+    hoz = runs / "hoz-0"
+    file = next((hoz / FOLDER).glob("*.safetensors"))
     for words, said in (
         ([*words_for(cache, unkept), "--curve"], f"'{unkept}' keeps no checkpoint for a curve; give a run folder"),
         (words_for(cache, runs / "none"), "There is no checkpoint"),
+        ([*words_for(cache, file), "--curve"], f"--curve needs run folders, and '{file}' is a file;"),
+        (words_for(cache, hoz, runs / "hoz-1", hoz), f"'{hoz}' and '{hoz}' are the same checkpoint; name it once."),
+        (words_for(cache, hoz, file), f"'{hoz}' and '{file}' are the same checkpoint; name it once."),
         (["analyse"], "Missing argument 'RUN...'."),
         ([*words_for(cache, runs / "object-0"), "--curve", "--split", "test"], "--curve compares checkpoints, which"),
     ):

@@ -1,51 +1,24 @@
-"""Measures, before `hoz-dist reproduce` begins, what the parts of its work will cost, and fills the view cache."""
+"""Measures, before `hoz-dist reproduce` begins, what the parts of its work will cost."""
 
 import multiprocessing
-import os
 import statistics
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from multiprocessing.connection import wait
 from pathlib import Path
 from typing import Any, Final
 
 from hoz_dist.cli.progress import Progress
-from hoz_dist.cli.rendering import Encoding, render_rooms
-from hoz_dist.cli.reproducing.crew import OUR_MISTAKE, Worker
+from hoz_dist.cli.rendering import Encoding, missing_rooms, render_rooms
+from hoz_dist.cli.reproducing.worker import OUR_MISTAKE, Failure, Worker
 from hoz_dist.errors import HozError, OwnMistakeError
-from hoz_dist.nav.rooms import RoomId, training_rooms
-from hoz_dist.policy.encoders import load_encoder
+from hoz_dist.policy.threads import use_one_thread
 from hoz_dist.reproduce.costs import Costs, Speed
-from hoz_dist.reproduce.job import Task, Training
+from hoz_dist.reproduce.job import Task, Training, rooms_needed
 from hoz_dist.reproduce.measuring import measure, sample_rooms
 from hoz_dist.sim.view_store import ViewStore
 
 _POLL_S: Final = 1.0
-
-
-def rooms_needed(tasks: Iterable[Task]) -> list[RoomId]:
-    """Return the rooms that tasks train, choose and test in, each once."""
-    rooms: dict[RoomId, None] = {}
-    for task in tasks:
-        if task.training is not None:
-            rooms |= dict.fromkeys(training_rooms(task.training.scenes))
-        for job in task.jobs:
-            rooms |= dict.fromkeys((*job.protocol.rooms("val"), *job.protocol.rooms("test")))
-    return list(rooms)
-
-
-def missing_rooms(rooms: Iterable[RoomId], cache: Path, picture_size: int) -> list[RoomId]:
-    """Return those rooms that the view cache lacks."""
-    store, encoder = ViewStore(cache, picture_size), load_encoder("pooled")
-    return [room for room in rooms if not store.holds(room, encoder)]
-
-
-def render(rooms: Sequence[RoomId], cache: Path, picture_size: int) -> float:
-    """Render rooms with every core; returns the seconds that it took."""
-    began = time.monotonic()
-    if rooms:
-        render_rooms(rooms, cache, picture_size, len(os.sched_getaffinity(0)), Encoding())
-    return time.monotonic() - began
 
 
 def measure_costs(tasks: Sequence[Task], cache: Path, picture_size: int, jobs: int) -> Costs:
@@ -55,7 +28,7 @@ def measure_costs(tasks: Sequence[Task], cache: Path, picture_size: int, jobs: i
         tasks: What is to do.
         cache: The view cache; some rooms are rendered into it.
         picture_size: Side of the pictures, pixels.
-        jobs: Processes that will work at once; as many do so now.
+        jobs: Processes that will work at once; as many do so now, but no more than there are tasks.
 
     Raises:
         HozError: The cache cannot be written, or a process failed.
@@ -63,15 +36,18 @@ def measure_costs(tasks: Sequence[Task], cache: Path, picture_size: int, jobs: i
     """
     trainings = {task.training.digest: task for task in tasks if task.training is not None}
     samples = [room for task in trainings.values() if task.training for room in sample_rooms(task.training.scenes)]
-    missing = missing_rooms(rooms_needed(tasks), cache, picture_size)
+    missing = missing_rooms(rooms_needed(tasks), cache, picture_size, Encoding())
     # Rooms of one scene are about as large as each other, so one of each tells enough.
     first = [room for room in dict.fromkeys(samples) if room in missing]
     first += {room.scene: room for room in missing if room.scene not in {one.scene for one in first}}.values()
-    seconds = render(first, cache, picture_size)
+    began = time.monotonic()
+    if first:
+        render_rooms(first, cache, picture_size, jobs, Encoding())
+    seconds = time.monotonic() - began
     of_scene: Mapping[str, int] = {room.scene: sum(one.scene == room.scene for one in missing) for room in first}
     share = statistics.fmean(of_scene.values()) if of_scene else 1.0
     return Costs(
-        speeds=_speeds(trainings, cache, jobs) if trainings else {},
+        speeds=_speeds(trainings, cache, min(jobs, len(tasks))) if trainings else {},
         render_seconds=seconds * max(0.0, share - 1.0),
     )
 
@@ -90,8 +66,8 @@ def _speeds(trainings: Mapping[str, Task], cache: Path, jobs: int) -> dict[str, 
                 for worker in owing:
                     status = worker.exit_status
                     for sent in worker.receive():
-                        if not isinstance(sent, Speed):
-                            raise HozError(sent.note)
+                        if isinstance(sent, Failure):
+                            raise HozError(sent.sentence)
                         measured[worker].append(sent)
                     if status and len(measured[worker]) < len(wanted):
                         if status > 0:
@@ -112,9 +88,7 @@ def _speeds(trainings: Mapping[str, Task], cache: Path, jobs: int) -> dict[str, 
 
 def _measure(wanted: Sequence[tuple[Training, int]], cache: Path, send: Callable[[Any], None]) -> None:
     """Measure one training after the other; the body of a process."""
-    import torch
-
-    torch.set_num_threads(1)
+    use_one_thread()
     for training, episodes in wanted:
         store = ViewStore(cache, training.config.picture_size)
         send(measure(training.config, sample_rooms(training.scenes), store, episodes))

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from hoz_dist.atomic import write_atomically
+from hoz_dist.errors import InvalidValueError
 from hoz_dist.reproduce.budget import Budget
 from hoz_dist.reproduce.job import Job
 from hoz_dist.reproduce.markdown import table_text
@@ -22,8 +23,8 @@ class Results:
     table: Table
     budget: Budget
     command: str
-    seeds: int | None
-    """Training runs of each row; None when they are as the budget says."""
+    seeds: str | None
+    """Which seeds each row is trained with, as `--seeds` has it; None when they are as the budget says."""
     jobs: Mapping[str, Sequence[Job]]
     """Of each row, finished or not."""
     outcomes: Mapping[str, Mapping[int, Outcome]]
@@ -40,7 +41,7 @@ class Results:
         jobs: Mapping[str, Sequence[Job]],
         out: Path,
         *,
-        seeds: int | None = None,
+        seeds: str | None = None,
     ) -> "Results":
         """Read what is finished.
 
@@ -50,7 +51,7 @@ class Results:
             command: The command that makes the table.
             jobs: Of each row.
             out: Folder of everything.
-            seeds: Training runs of each row; None when they are as the budget says.
+            seeds: Which seeds each row is trained with, as `--seeds` has it; None when they are as the budget says.
 
         Raises:
             DamagedFileError: A file holds no outcome.
@@ -73,7 +74,7 @@ class Results:
 
     @property
     def stem(self) -> str:
-        """What the table's files are called, less their suffixes; a table of fewer seeds is another one."""
+        """What the table's files are called, less their suffixes; a table of other seeds is another one."""
         return f"{self.table.name}-{self.budget.name}" + ("" if self.seeds is None else f"-seeds-{self.seeds}")
 
     @property
@@ -132,6 +133,26 @@ class Results:
                 for name, summary in self.summaries.items()
             },
         }
+
+    def refuse_to_replace_more(self, folder: Path) -> None:
+        """Keep the table's files in a folder from being replaced by what has fewer results.
+
+        Raises:
+            InvalidValueError: They would be.
+        """
+        file = folder / f"{self.stem}.json"
+        try:
+            rows = json.loads(file.read_text("utf-8"))["rows"].values()
+            there = sum(len(row["runs"]) for row in rows)
+        except (FileNotFoundError, ValueError, KeyError, TypeError, AttributeError):
+            return  # nothing, or nothing of ours that is worth keeping
+        here = sum(map(len, self.outcomes.values()))
+        if here < there:
+            message = (
+                f"'{file}' is of {there} results and would be replaced by {here}; finish the table, or choose another "
+                "--docs."
+            )
+            raise InvalidValueError(message)
 
     def write(self, folder: Path, sessions: Sequence[Mapping[str, Any]]) -> list[Path]:
         """Write the table's files, and return them.

@@ -49,7 +49,8 @@ class Session:
     ) -> None:
         self._ended.set()
         self._clock.join()
-        self._note(finished=error is None)
+        with suppress(OSError):  # no result hangs on it, and what ended the session is to be known
+            self._note(finished=error is None)
 
     def _note_now_and_then(self) -> None:
         # Ctrl-C is for the main thread, which now and then keeps it out.

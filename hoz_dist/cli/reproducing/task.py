@@ -4,6 +4,7 @@ Whatever is finished is in a file, written atomically, and is not done again: a 
 of the checkpoint, the outcome of each test. So a process may be killed at any moment.
 """
 
+import hashlib
 import json
 import os
 import threading
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
     from hoz_dist.evaluation.benchmark import Benchmark
     from learner.checkpoint import Checkpoint
 
-Stage = Literal["training", "choosing", "testing", "failed"]
+Stage = Literal["training", "choosing", "testing"]
 FREE_S: Final = 30.0
 """How long a learner of a killed command may take to end, seconds."""
 _POLL_S: Final = 0.1
@@ -46,7 +47,7 @@ class Report(NamedTuple):
     share: float = 0.0
     """Of the stage, in [0, 1]."""
     note: str = ""
-    """More about it; of a failure, what went wrong."""
+    """More about it."""
 
 
 Tell = Callable[[Report], None]
@@ -71,16 +72,16 @@ def perform(task: Task, place: Place, tell: Tell) -> None:
         tell: Told how far it is.
 
     Raises:
-        HozError: Something failed that will fail again.
+        HozError: Something failed.
     """
     waiting = task.waiting(place.out)
     if not waiting:
         return
     if task.training is not None:
         _train(task.training, place, tell)
-    import torch
+    from hoz_dist.policy.threads import use_one_thread
 
-    torch.set_num_threads(1)  # as everywhere: results do not depend on the number of cores
+    use_one_thread()
     for job in waiting:
         _test(job, place, tell)
 
@@ -130,9 +131,14 @@ def _choose(job: Job, training: Training, place: Place, tell: Tell) -> "tuple[Ch
     file, run = job.choice(place.out), training.folder(place.out)
     if file.exists():
         choice = _read_json(file)
-        # Chosen anew when it is gone: somebody deleted the run, and it was trained again.
+        path = run / FOLDER / choice["checkpoint"]
+        # Chosen anew when somebody deleted the run, and it was trained again: then this checkpoint is gone, or another
+        # one, for names say no more than epoch and version. Files from before the digest was kept are taken at their
+        # word: to choose anew is to evaluate all candidates again.
         with suppress(NotFoundError):
-            return load_checkpoint(run / FOLDER / choice["checkpoint"]), choice
+            checkpoint = load_checkpoint(path)
+            if choice.get("sha256") in {None, _sha256(path)}:
+                return checkpoint, choice
     protocol, began = job.protocol, time.monotonic()
     benchmark = _benchmark(
         place, training.config.picture_size, protocol.rooms("val"), "val", protocol.validation_episodes
@@ -148,9 +154,15 @@ def _choose(job: Job, training: Training, place: Place, tell: Tell) -> "tuple[Ch
             | {name: round(100 * getattr(metrics, name), 2) for name in ("sr", "spl", "sae")}
         )
     best = max(candidates, key=lambda one: (one["sr"], one["spl"], one["frames"]))
-    choice = {"checkpoint": best["checkpoint"], "candidates": candidates, "seconds": time.monotonic() - began}
+    path = run / FOLDER / best["checkpoint"]
+    choice = {
+        "checkpoint": path.name,
+        "sha256": _sha256(path),
+        "candidates": candidates,
+        "seconds": time.monotonic() - began,
+    }
     _write_json(file, choice)
-    return load_checkpoint(run / FOLDER / best["checkpoint"]), choice
+    return load_checkpoint(path), choice
 
 
 def _test(job: Job, place: Place, tell: Tell) -> None:
@@ -208,6 +220,11 @@ def _benchmark(place: Place, picture_size: int, rooms: tuple[Any, ...], split: S
 
     store, encoder = ViewStore(place.cache, picture_size), load_encoder("pooled")
     return Benchmark.of([store.open(room, encoder) for room in rooms], split, episodes)
+
+
+def _sha256(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def _write_json(path: Path, value: object) -> None:

@@ -16,7 +16,7 @@ COMPONENTS: Final = Table(
     rows=(
         A3C,
         OBJECT,
-        Row(name="object and zone", agent="hoz", key=True, options={"without": ("scene", "done")}),
+        Row(name="object and zone", agent="hoz", more_seeds=True, options={"without": ("scene", "done")}),
         Row(name="object, scene and zone", agent="hoz", options={"without": ("done",)}),
         WITHOUT_ZONE,
         Row(name="hoz without scene", agent="hoz", options={"without": ("scene",)}),

@@ -11,6 +11,7 @@ import pytest
 from hoz_dist import __version__
 from hoz_dist.cli.main import COMMANDS, cli, run
 from hoz_dist.errors import OwnMistakeError
+from hoz_dist.evaluation.protocol import TEMPERATURE
 
 HEAVY = {"torch", "numpy", "scipy", "sklearn", "pybullet", "gymnasium", "zenoh", "matplotlib", "rich", "msgpack"}
 
@@ -29,17 +30,27 @@ def words_of(path: str) -> list[str]:
     return path.split()[1:]
 
 
-def test_help_lists_every_command_and_imports_nothing_heavy() -> None:
+def help_in_a_fresh_process(*words: str) -> str:
+    """Return what `hoz-dist WORDS --help` prints; it may import nothing heavy."""
     code = (
-        "import sys; from hoz_dist.cli.main import run; status = run(['--help']);"
+        f"import sys; from hoz_dist.cli.main import run; status = run([*{words!r}, '--help']);"
         f"print('heavy:', sorted({HEAVY!r} & set(sys.modules)), file=sys.stderr); sys.exit(status)"
     )
-    start = time.perf_counter()
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    elapsed = time.perf_counter() - start
     assert (done.returncode, done.stderr) == (0, "heavy: []\n")
-    assert all(f"  {name} " in done.stdout for name in COMMANDS)
+    return done.stdout
+
+
+def test_help_lists_every_command_and_imports_nothing_heavy() -> None:
+    start = time.perf_counter()
+    said = help_in_a_fresh_process()
+    elapsed = time.perf_counter() - start
+    assert all(f"  {name} " in said for name in COMMANDS)
     assert elapsed < 2.0  # about 0.07 s; the margin is for a busy machine
+
+
+def test_help_of_evaluate_tells_the_temperature_and_imports_nothing_heavy() -> None:
+    assert f"[default: {TEMPERATURE}; 0.01<=x<=10.0]" in " ".join(help_in_a_fresh_process("evaluate").split())
 
 
 def test_the_table_names_real_commands() -> None:

@@ -79,3 +79,14 @@ def test_a_terminal_gets_a_bar() -> None:
         progress.update(100)
     assert "━" in out.getvalue()
     assert "100/100 views" in out.getvalue()
+
+
+@pytest.mark.parametrize("terminal", [False, True])
+def test_what_is_said_on_the_way_stays(*, terminal: bool) -> None:
+    out = io.StringIO()
+    console = Console(file=out, force_terminal=terminal, width=120)
+    with Progress("Reproducing", 10, None, console=console, every=60.0, clock=Clock()) as progress:
+        progress.update(1)
+        progress.say("hoz failed [again]")
+        progress.update(2)
+    assert "hoz failed [again]\n" in out.getvalue().replace("\r", "")

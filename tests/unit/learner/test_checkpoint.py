@@ -126,6 +126,7 @@ def test_kept_checkpoints_are_of_one_training_each_version_once(tmp_path: Path, 
         save_checkpoint(tmp_path / FOLDER, replace(checkpoint, epoch=epoch, version=version), keep=True)
     kept = [Stamp.of(path) for path in kept_checkpoints(tmp_path)]
     assert kept == [(1, 10), (2, 20), (5, 30)]
+    assert [Stamp.of(path) for path in kept_checkpoints(tmp_path / FOLDER)] == kept
     save_checkpoint(tmp_path / FOLDER, replace(checkpoint, epoch=5, version=40))
     assert [Stamp.of(path) for path in kept_checkpoints(tmp_path)] == kept
     assert [Stamp.of(path) for path in kept_checkpoints(tmp_path, with_newest=True)] == [*kept, (5, 40)]

@@ -6,7 +6,7 @@ from hoz_dist.reproduce.budget import Budget
 from hoz_dist.reproduce.outcome import Outcome
 from hoz_dist.reproduce.row import Row, Table
 
-TINY = Budget(name="tiny", room_frames=1000, apartment_frames=2000, seeds=1, key_seeds=3, trials=2, test_episodes=8)
+TINY = Budget(name="tiny", room_frames=1000, apartment_frames=2000, seeds=1, more_seeds=3, trials=2, test_episodes=8)
 TABLE = Table(
     name="some",
     title="Some rows",
@@ -15,13 +15,13 @@ TABLE = Table(
     rows=(
         Row(name="random", agent="random"),
         Row(name="object", agent="object"),
-        Row(name="other order", agent="hoz", key=True, tested_with={"merge_order": 4}),
-        Row(name="hoz", agent="hoz", key=True),
+        Row(name="other order", agent="hoz", more_seeds=True, tested_with={"merge_order": 4}),
+        Row(name="hoz", agent="hoz", more_seeds=True),
     ),
 )
 
 
-def make_outcome(seed: int = 0, trials: int = 3, episodes: int = 40, skill: float = 0.6) -> Outcome:
+def make_outcome(seed: int = 0, trials: int = 3, episodes: int = 80, skill: float = 0.6) -> Outcome:
     """Results of an agent that succeeds with a probability, on episodes that are always the same."""
     fixed, rng = np.random.default_rng(0), np.random.default_rng([1, seed])
     optimal = fixed.integers(1, 12, episodes)

@@ -109,7 +109,7 @@ def test_pictures_and_what_is_derived_from_them_are_those_of_the_recipe() -> Non
 
 def test_tasks_put_tests_of_one_training_together_and_seeds_first(tmp_path: Path) -> None:
     jobs = [job for row in TABLE.rows for job in jobs_of(TABLE, row, TINY)]
-    tasks = tasks_of([*jobs, *jobs], tmp_path)
+    tasks = tasks_of([*jobs, *(replace(job, row="another") for job in jobs)], tmp_path)
     assert [(task.jobs[0].agent, task.jobs[0].seed, len(task.jobs)) for task in tasks] == [
         ("random", 0, 1),
         ("object", 0, 1),
@@ -117,11 +117,26 @@ def test_tasks_put_tests_of_one_training_together_and_seeds_first(tmp_path: Path
         ("hoz", 1, 2),
         ("hoz", 2, 2),
     ]
+    assert [task.name for task in tasks] == [
+        "random",
+        "object, seed 0",
+        "other order, seed 0",
+        "other order, seed 1",
+        "other order, seed 2",
+    ]
     done = tasks[2].jobs[0].result(tmp_path)
     done.parent.mkdir(parents=True)
     done.touch()
     assert tasks[2].waiting(tmp_path) == tasks[2].jobs[1:]
     assert tasks[3].waiting(tmp_path) == tasks[3].jobs
+
+
+def test_tasks_of_one_method_are_told_apart_by_their_names(tmp_path: Path) -> None:
+    table = TABLES["components"]
+    tasks = tasks_of([job for row in table.rows for job in jobs_of(table, row, BUDGETS["quick"])], tmp_path)
+    names = [task.name for task in tasks]
+    assert len(set(names)) == len(names)
+    assert "hoz without scene, seed 0" in names
 
 
 def test_a_row_of_an_unknown_method_is_refused() -> None:

@@ -8,8 +8,7 @@ from typing import Any
 import pytest
 
 from hoz_dist.cli.reproducing import costs as reproduce_costs
-from hoz_dist.cli.reproducing.crew import Worker
-from hoz_dist.cli.reproducing.task import Report
+from hoz_dist.cli.reproducing.worker import Failure, Worker
 from hoz_dist.errors import HozError, OwnMistakeError
 from hoz_dist.reproduce.costs import Speed
 from hoz_dist.reproduce.job import jobs_of, tasks_of
@@ -25,9 +24,9 @@ def fill_the_disk(path: str, send: Callable[[Any], None]) -> None:
 def test_a_full_disk_is_no_mistake_of_ours() -> None:
     worker = Worker(multiprocessing.get_context("spawn"), fill_the_disk, "somewhere")
     assert worker.connection.poll(60)
-    (report,) = worker.receive()
+    received = worker.receive()
     worker.join()
-    assert report == Report("failed", note="'somewhere': No space left on device.")
+    assert received == [Failure("'somewhere': No space left on device.")]
 
 
 @pytest.mark.parametrize(
@@ -40,6 +39,14 @@ def test_a_measurement_that_was_killed_is_told_from_one_that_failed(
     monkeypatch.setattr(reproduce_costs, "wait", lambda *_: [])
     (task,) = tasks_of(jobs_of(TABLE, TABLE.rows[1], TINY), tmp_path)
     with pytest.raises(kind, match=reason):
+        reproduce_costs._speeds({"object": task}, tmp_path, 1)
+
+
+def test_a_measurement_that_fails_says_why(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(reproduce_costs, "Worker", lambda *_: Worked(1, [Failure("The disk is full.")]))
+    monkeypatch.setattr(reproduce_costs, "wait", lambda *_: [])
+    (task,) = tasks_of(jobs_of(TABLE, TABLE.rows[1], TINY), tmp_path)
+    with pytest.raises(HozError, match=r"The disk is full\."):
         reproduce_costs._speeds({"object": task}, tmp_path, 1)
 
 

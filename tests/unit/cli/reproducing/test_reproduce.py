@@ -9,6 +9,7 @@ from filelock import FileLock
 
 from hoz_dist.cli.main import EXIT_USER_ERROR, run
 from hoz_dist.cli.reproducing.results import Results
+from hoz_dist.reproduce.budget import BUDGETS
 from hoz_dist.reproduce.job import jobs_of
 from hoz_dist.reproduce.outcome import METRICS
 from hoz_dist.reproduce.tables import TABLES
@@ -32,11 +33,22 @@ def test_without_a_table_all_are_listed(capsys: pytest.CaptureFixture[str]) -> N
     ("words", "sentence"),
     [
         (["tabel"], "table"),
+        (["--collect"], "--collect is about one table; name it"),
+        (["--row", "hoz"], "--row is about one table"),
+        (["methods", "--seeds", "some"], "'some' is neither a number of seeds nor FIRST-LAST"),
+        (["methods", "--seeds", "0"], "'0' is no range of seeds from 0 to 99"),
+        (["methods", "--seeds", "9-5"], "give FIRST before LAST"),
+        (["--seeds", "5"], "--seeds is about one table"),
+        (["methods", "--seeds", "5-100"], "'5-100' is no range of seeds from 0 to 99"),
         (["methods", "--budget", "none"], "budget"),
         (["methods", "--row", "hoz2"], "row"),
-        (["methods", "--row", "hoz", "--collect"], "--row chooses"),
-        (["methods", "--estimate", "--collect"], "--estimate says"),
+        (["methods", "--row", "hoz", "--collect"], "--collect shows all rows, so --row"),
+        (["methods", "--estimate", "--collect"], "--estimate and --collect are two things"),
         (["methods", "--estimate", "--docs", "docs"], "--estimate makes no files"),
+        (["methods", "--runs", "--estimate"], "--estimate and --runs are two"),
+        (["methods", "--runs", "--collect"], "--collect and --runs are two"),
+        (["methods", "--runs", "--docs", "docs"], "--runs makes no files, so --docs"),
+        (["methods", "--runs", "--out", "none"], "'none' has no finished run of these rows"),
     ],
 )
 def test_what_does_not_exist_is_said(words: list[str], sentence: str, capsys: pytest.CaptureFixture[str]) -> None:
@@ -52,9 +64,42 @@ def test_help_says_what_a_budget_gives(capsys: pytest.CaptureFixture[str]) -> No
     assert re.search(r"full: 16M frames in rooms, 24M in apartments, 5 seeds[.;]", said)
 
 
-def test_a_table_can_be_shown_before_anything_is_finished(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["reproduce", "edge-cost", "--collect", "--out", str(tmp_path)]) == 0
-    assert "No results yet." in capsys.readouterr().out
+def test_a_table_without_results_is_not_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out, docs = tmp_path / "typo", tmp_path / "docs"
+    docs.mkdir()
+    (docs / "edge-cost-quick.md").write_text("published")
+    words = ["reproduce", "edge-cost", "--collect", "--out", str(out), "--docs", str(docs)]
+    assert run(words) == EXIT_USER_ERROR
+    assert f"'{out}' has no results of 'edge-cost-quick'" in capsys.readouterr().err
+    assert [path.read_text() for path in docs.iterdir()] == ["published"]
+
+
+def test_published_results_are_not_replaced_by_fewer(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["reproduce", "zones", "--collect", "--docs", str(tmp_path / "docs"), "--out"]
+    save_outcomes("zones", "quick", range(2), tmp_path / "whole")
+    save_outcomes("zones", "quick", range(1), tmp_path / "part")
+    assert run([*words, str(tmp_path / "whole")]) == 0
+    published = {path: path.read_bytes() for path in (tmp_path / "docs").iterdir()}
+    assert run([*words, str(tmp_path / "part")]) == EXIT_USER_ERROR
+    assert "is of 2 results and would be replaced by 1" in capsys.readouterr().err
+    assert {path: path.read_bytes() for path in (tmp_path / "docs").iterdir()} == published
+    assert run([*words, str(tmp_path / "whole")]) == 0
+
+
+def test_runs_that_are_trained_and_tested_are_listed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    rows = {row.name: jobs_of(TABLES["methods"], row, BUDGETS["quick"]) for row in TABLES["methods"].rows}
+    for job in (*rows["object"], *rows["hoz"]):
+        assert job.training is not None
+        job.training.folder(tmp_path).mkdir(parents=True)
+    tested = [rows["random"][0], rows["object"][0], *rows["hoz"]]
+    for job in tested:
+        make_outcome().save(job.result(tmp_path))
+    folders = [str(job.training.folder(tmp_path)) for job in tested if job.training is not None]
+
+    assert run(["reproduce", "methods", "--runs", "--out", str(tmp_path)]) == 0
+    assert capsys.readouterr().out.splitlines() == folders
+    assert run(["reproduce", "methods", "--runs", "--row", "hoz", "--out", str(tmp_path), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == folders[1:]
 
 
 def test_results_are_read_written_and_counted_once(tmp_path: Path) -> None:
@@ -90,6 +135,7 @@ def test_results_are_read_written_and_counted_once(tmp_path: Path) -> None:
     ("words", "stem", "own"),
     [
         (["--budget", "full"], "zones-full", [1]),
+        (["--seeds", "3"], "zones-quick-seeds-3", [3]),
         (["--seeds", "4"], "zones-quick-seeds-4", [4]),
         ([], "zones-quick", [0]),
     ],
@@ -99,20 +145,35 @@ def test_a_table_shows_its_own_sessions(tmp_path: Path, words: list[str], stem: 
         {"table": "zones", "budget": "quick", "took_seconds": None},  # from before --seeds was noted
         {"table": "zones", "budget": "full", "took_seconds": 1.0, "seeds": None, "rows": ["hoz"]},
         {"table": "methods", "budget": "quick", "took_seconds": 2.0},
-        {"table": "zones", "budget": "quick", "took_seconds": 3.0, "seeds": 3, "rows": []},
-        {"table": "zones", "budget": "quick", "took_seconds": 4.0, "seeds": 4, "rows": []},
+        {"table": "zones", "budget": "quick", "took_seconds": 3.0, "seeds": 3, "rows": []},  # from before 5-14 was
+        {"table": "zones", "budget": "quick", "took_seconds": 4.0, "seeds": "4", "rows": []},
     ]
     (tmp_path / "sessions.json").write_text(json.dumps(sessions))
+    save_outcomes("zones", words[1] if "--budget" in words else "quick", range(1), tmp_path)
     assert run(["reproduce", "zones", *words, "--collect", "--out", str(tmp_path)]) == 0
     shown = json.loads((tmp_path / f"{stem}.json").read_text())["sessions"]
     assert shown == [sessions[number] for number in own]
 
 
-@pytest.mark.parametrize(("seeds", "stem"), [(2, "methods-full-seeds-2"), (5, "methods-full")])
-def test_a_table_of_other_seeds_does_not_overwrite_the_whole_one(tmp_path: Path, seeds: int, stem: str) -> None:
-    words = ["reproduce", "methods", "--budget", "full", "--collect", "--out", str(tmp_path), "--seeds", str(seeds)]
-    assert run(words) == 0
-    assert {path.name for path in tmp_path.iterdir()} == {f"{stem}.md", f"{stem}.json"}
+@pytest.mark.parametrize(
+    ("seeds", "stem", "shown"),
+    [
+        ("2", "methods-full-seeds-2", [0, 1]),
+        ("5", "methods-full", [0, 1, 2, 3]),
+        ("0-4", "methods-full", [0, 1, 2, 3]),
+        ("2-9", "methods-full-seeds-2-9", [2, 3]),
+    ],
+)
+def test_a_table_of_other_seeds_does_not_overwrite_the_whole_one(
+    tmp_path: Path, seeds: str, stem: str, shown: list[int]
+) -> None:
+    save_outcomes("methods", "full", range(4), tmp_path / "all")
+    words = ["--out", str(tmp_path / "all"), "--docs", str(tmp_path / "docs"), "--seeds", seeds]
+    assert run(["reproduce", "methods", "--budget", "full", "--collect", *words]) == 0
+    assert {path.name for path in (tmp_path / "docs").iterdir()} == {
+        f"{stem}.{suffix}" for suffix in ("md", "json", "png")
+    }
+    assert json.loads((tmp_path / "docs" / f"{stem}.json").read_text())["rows"]["hoz"]["seeds"] == shown
 
 
 def test_a_second_command_on_one_folder_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -141,6 +202,13 @@ def test_files_for_the_documentation_are_those_of_the_folder(
     published = json.loads((DOCS / "methods-quick.json").read_text())
     assert means(json.loads(out)) == means(published)
     assert (json.loads(out)["unfinished"], json.loads(out)["hours"]) == ({}, published["hours"])
+
+
+def save_outcomes(table: str, budget: str, seeds: range, out: Path) -> None:
+    """Have runs of `hoz` finished."""
+    row = next(row for row in TABLES[table].rows if row.name == "hoz")
+    for job in jobs_of(TABLES[table], row, BUDGETS[budget], seeds):
+        make_outcome(job.seed).save(job.result(out))
 
 
 def means(results: dict[str, Any]) -> dict[str, dict[str, float]]:

@@ -1,4 +1,5 @@
 import json
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -6,6 +7,7 @@ import pytest
 
 from hoz_dist.cli.reproducing import sessions
 from hoz_dist.cli.reproducing.sessions import Session, read_sessions
+from hoz_dist.errors import HozError
 from tests.waiting import until
 
 
@@ -30,6 +32,20 @@ def test_a_session_that_fails_is_noted_beside_those_before_it(tmp_path: Path) ->
     first, second = read_sessions(tmp_path)
     assert first == old
     assert (second["table"], second["seeds"], second["finished"]) == ("some", 2, False)
+
+
+def test_what_ended_a_session_is_known_when_it_cannot_be_noted(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    out.mkdir()
+
+    def lose_the_folder_and_fail() -> None:
+        with Session(out, {"table": "some"}):
+            shutil.rmtree(out)
+            message = "No learner answers."
+            raise HozError(message)
+
+    with pytest.raises(HozError, match="No learner"):
+        lose_the_folder_and_fail()
 
 
 @pytest.mark.parametrize("text", ["", "{}", '[{"took_seconds": 3.0}, 7]'])

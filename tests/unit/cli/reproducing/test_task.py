@@ -14,7 +14,7 @@ from hoz_dist.nav.episode import EpisodeResult
 from hoz_dist.nav.rooms import RoomId
 from hoz_dist.reproduce.job import Job, jobs_of
 from hoz_dist.reproduce.outcome import Outcome
-from learner.checkpoint import FOLDER, save_checkpoint
+from learner.checkpoint import FOLDER, load_checkpoint, save_checkpoint
 from learner.core import LearnerCore
 from tests.unit.learner.making import CONFIG, vector
 from tests.unit.reproduce.making import TABLE, TINY
@@ -70,3 +70,20 @@ def test_a_checkpoint_that_is_gone_is_chosen_anew(tmp_path: Path, job: Job) -> N
     chosen, choice = reproduce_task._choose(job, job.training, Place(tmp_path, tmp_path), lambda _: None)
     assert (chosen.version, choice["checkpoint"]) == (40, "0003-000000040.safetensors")
     assert json.loads(file.read_text()) == choice
+
+
+@pytest.mark.usefixtures("benchmark")
+def test_a_choice_holds_for_the_checkpoint_that_was_chosen_alone(tmp_path: Path, job: Job) -> None:
+    assert job.training is not None
+    place, folder = Place(tmp_path, tmp_path), job.training.folder(tmp_path) / FOLDER
+    _, choice = reproduce_task._choose(job, job.training, place, lambda _: None)
+    # As long as the training is the same, nothing is chosen again.
+    job.choice(tmp_path).write_text(json.dumps(choice | {"seconds": -1.0}))
+    assert reproduce_task._choose(job, job.training, place, lambda _: None)[1]["seconds"] == -1.0
+
+    trained_again = replace(load_checkpoint(folder / choice["checkpoint"]), frames=4321, seconds=99.0)
+    assert save_checkpoint(folder, trained_again).name == choice["checkpoint"]
+    chosen, again = reproduce_task._choose(job, job.training, place, lambda _: None)
+    assert (chosen.frames, again["candidates"][-1]["frames"]) == (4321, 4321)
+    assert again["seconds"] >= 0.0
+    assert json.loads(job.choice(tmp_path).read_text()) == again

@@ -7,11 +7,14 @@ from typing import Any
 
 import pytest
 
+from hoz_dist.cli import rendering
 from hoz_dist.cli.main import EXIT_FAILED, EXIT_USER_ERROR, run
 from hoz_dist.cli.processes import MOST_RESTARTS
-from hoz_dist.cli.reproducing import costs as reproduce_costs
 from hoz_dist.cli.reproducing import crew as reproduce_crew
+from hoz_dist.cli.reproducing import work as reproduce_work
 from hoz_dist.cli.reproducing.sessions import read_sessions
+from hoz_dist.cli.reproducing.worker import Failure
+from hoz_dist.nav.rooms import RoomId
 from hoz_dist.reproduce.budget import BUDGETS
 from hoz_dist.reproduce.costs import Costs, Speed
 from hoz_dist.reproduce.job import Task
@@ -36,8 +39,8 @@ def command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., in
 
     monkeypatch.setitem(TABLES, "some", TABLE)
     monkeypatch.setitem(BUDGETS, "tiny", TINY)
-    monkeypatch.setattr(reproduce_costs, "measure_costs", costs)
-    monkeypatch.setattr(reproduce_costs, "missing_rooms", lambda *_: [])
+    monkeypatch.setattr(reproduce_work, "measure_costs", costs)
+    monkeypatch.setattr(rendering, "missing_rooms", lambda *_: [])
     monkeypatch.setattr(reproduce_crew, "wait", lambda *_: [])
     return started
 
@@ -57,6 +60,17 @@ def test_an_estimate_trains_nothing(
     assert [path.name for path in tmp_path.iterdir()] == ["reproduce.lock"]
 
 
+def test_as_many_processes_render_as_will_work(
+    tmp_path: Path, command: Callable[..., int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rendered: list[tuple[list[RoomId], int]] = []
+    monkeypatch.setattr(rendering, "missing_rooms", lambda rooms, *_: rooms[:5])
+    monkeypatch.setattr(rendering, "render_rooms", lambda rooms, _, __, jobs, ___: rendered.append((rooms, jobs)))
+    assert command(lambda task: finished(task, tmp_path)) == 0
+    ((rooms, jobs),) = rendered
+    assert (len(rooms), jobs) == (5, 2)
+
+
 def test_a_process_that_is_killed_is_started_again(tmp_path: Path, command: Callable[..., int]) -> None:
     started: list[Task] = []
 
@@ -64,9 +78,7 @@ def test_a_process_that_is_killed_is_started_again(tmp_path: Path, command: Call
         started.append(task)
         if started.count(task) <= MOST_RESTARTS:
             return Worked(-9)
-        for job in task.jobs:
-            make_outcome(job.seed).save(job.result(tmp_path))
-        return Worked(0)
+        return finished(task, tmp_path)
 
     assert command(start) == 0
     assert len(started) == 5 * (MOST_RESTARTS + 1)
@@ -83,35 +95,95 @@ def test_a_process_that_is_killed_is_started_again(tmp_path: Path, command: Call
     }
 
 
+def test_a_task_that_fails_is_tried_once_more(
+    tmp_path: Path, command: Callable[..., int], capsys: pytest.CaptureFixture[str]
+) -> None:
+    started: list[str] = []
+
+    def start(task: Task) -> Worked:
+        started.append(task.name)
+        if started.count(task.name) == 1:
+            return Worked(1, [Failure("The learner did not answer.")])
+        return finished(task, tmp_path)
+
+    assert command(start) == 0
+    assert len(started) == 10
+    said = capsys.readouterr().err
+    assert "object, seed 0 failed, and is started once more: The learner did not answer." in said.splitlines()
+    assert json.loads((tmp_path / "some-tiny.json").read_text())["unfinished"] == {}
+
+
 @pytest.mark.parametrize(
-    ("ended", "status", "said", "starts"),
+    ("status", "sent", "starts", "sentence"),
     [
+        (1, [Failure("The port is taken.")], 2, "The port is taken."),
         (
             -9,
-            EXIT_USER_ERROR,
-            "was killed again and again, perhaps for want of memory; use fewer --jobs.",
+            [],
             MOST_RESTARTS + 1,
+            "Its process was killed again and again, perhaps for want of memory; use fewer --jobs.",
         ),
-        (1, EXIT_FAILED, "failed by a mistake of ours; what it says is above.", 1),
     ],
 )
-def test_a_process_that_fails_or_is_killed_too_often_ends_the_command_in_one_sentence(
+def test_a_task_that_fails_again_keeps_no_other_from_being_done(
     tmp_path: Path,
     command: Callable[..., int],
     capsys: pytest.CaptureFixture[str],
-    ended: int,
     status: int,
-    said: str,
+    sent: list[Failure],
     starts: int,
+    sentence: str,
 ) -> None:
-    started: list[Worked] = []
+    started: list[str] = []
 
-    def start(_: Task) -> Worked:
-        started.append(Worked(ended))
-        return started[-1]
+    def start(task: Task) -> Worked:
+        started.append(task.name)
+        if task.name in {"object, seed 0", "other order, seed 1"}:
+            return Worked(status, sent)
+        return finished(task, tmp_path)
 
-    assert command(start, "--row", "object", "--seeds", "1") == status
-    assert len(started) == starts
-    assert capsys.readouterr().err.splitlines()[-1] == f"hoz-dist: A process of this command {said}"
+    assert command(start) == EXIT_USER_ERROR
+    assert len(started) == 3 + 2 * starts
+    said = capsys.readouterr().err.splitlines()
+    assert said[-1] == (
+        f"hoz-dist: 2 of 5 agents failed, and the same command tries again; first 'object, seed 0': {sentence}"
+    )
+    # Each one's reason is there to be read, when it fails and in the morning.
+    for name in ("object, seed 0", "other order, seed 1"):
+        assert [line for line in said if line.startswith(f"{name} ") and line.endswith(f"this command: {sentence}")]
+    assert "3 of 5 agents, 2 failed" in said[-2]
+    assert read_sessions(tmp_path)[-1]["finished"] is False
+
+    again: list[Task] = []
+
+    def start_again(task: Task) -> Worked:
+        again.append(task)
+        return finished(task, tmp_path)
+
+    assert command(start_again) == 0
+    assert [task.name for task in again] == ["object, seed 0", "other order, seed 1"]
+
+
+def test_a_mistake_of_ours_ends_the_command_at_once(
+    tmp_path: Path, command: Callable[..., int], capsys: pytest.CaptureFixture[str]
+) -> None:
+    started: list[Task] = []
+
+    def start(task: Task) -> Worked:
+        started.append(task)
+        return Worked(1)
+
+    assert command(start, "--row", "object", "--row", "hoz", "--seeds", "2") == EXIT_FAILED
+    assert len(started) == 2
+    assert capsys.readouterr().err.splitlines()[-1] == (
+        "hoz-dist: object, seed 0: A process of this command failed by a mistake of ours; what it says is above."
+    )
     (session,) = read_sessions(tmp_path)
-    assert (session["seeds"], session["rows"], session["finished"]) == (1, ["object"], False)
+    assert (session["seeds"], session["rows"], session["finished"]) == ("2", ["object", "hoz"], False)
+
+
+def finished(task: Task, out: Path) -> Worked:
+    """A process that has done its task."""
+    for job in task.jobs:
+        make_outcome(job.seed).save(job.result(out))
+    return Worked(0)
