@@ -15,7 +15,7 @@ DEMO ?= train --run runs/demo --minutes 10
 help:  ## Say what the targets do.
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 14
 
-demo: install  ## Train on all four scenes, evaluate, draw pictures; about 13 minutes.
+demo: install  ## Train on all four scenes, evaluate, draw pictures; about 12 minutes.
 	$(BIN)/hoz-dist $(DEMO)
 
 test: install-dev  ## Run all tests but the long ones.
