@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
+from click.core import ParameterSource
 
 from hoz_dist.cli.options import cache_option, echo_json, json_option
 from hoz_dist.cli.reproducing.seeds import SeedsType, seeds_text
@@ -13,8 +14,7 @@ from hoz_dist.errors import InvalidValueError, UnknownNameError
 from hoz_dist.reproduce.budget import BUDGETS, Budget
 
 if TYPE_CHECKING:
-    from hoz_dist.reproduce.job import Job
-    from hoz_dist.reproduce.row import Table
+    from hoz_dist.cli.reproducing.results import Results
 
 
 def _figures(budget: Budget) -> str:
@@ -56,7 +56,7 @@ def _figures(budget: Budget) -> str:
 @click.option(
     "--docs",
     type=click.Path(file_okay=False, path_type=Path),
-    help="Put Markdown, JSON and picture of the table into this folder, too.",
+    help="Put Markdown, JSON and picture of the table into this folder, too.  [default: nowhere else]",
 )
 @cache_option
 @json_option
@@ -83,7 +83,7 @@ def reproduce_command(
     _refuse_contradictions(
         table,
         {"--estimate": estimate, "--collect": collect, "--runs": runs},
-        {"--row": rows, "--docs": docs, "--seeds": seeds},
+        {"--row": rows, "--docs": docs, "--seeds": seeds, "--jobs": jobs, "--out": _is_given("out")},
     )
     _refuse_unknown(table, budget, rows)
     from hoz_dist.cli.reproducing.listing import list_runs, list_tables
@@ -104,11 +104,16 @@ def reproduce_command(
     if runs:
         list_runs(chosen, out, as_json=as_json)
         return
-    if docs is not None:
-        docs.mkdir(parents=True, exist_ok=True)  # before hours of training
+    from hoz_dist.cli.reproducing.results import Results
+
     if not collect:
+        from hoz_dist.cli.reproducing.outcomes import read_outcomes
         from hoz_dist.cli.reproducing.work import alone, work_off
 
+        # Before hours of training: what would fail after them.
+        if docs is not None:
+            docs.mkdir(parents=True, exist_ok=True)
+        read_outcomes(of_rows, out)
         with alone(out):
             processes = jobs or len(os.sched_getaffinity(0))
             facts = {"table": table, "budget": budget, "seeds": own_seeds, "rows": list(rows)}
@@ -116,7 +121,13 @@ def reproduce_command(
         if not finished:
             return
     command = f"hoz-dist reproduce {table} --budget {budget}" + (f" --seeds {own_seeds}" if own_seeds else "")
-    _show(wanted, spend, command, of_rows, out, docs, seeds=own_seeds, as_json=as_json)
+    results = Results.read(wanted, spend, command, of_rows, out, seeds=own_seeds)
+    _show(results, out, docs, only_collect=collect, as_json=as_json)
+
+
+def _is_given(option: str) -> bool:
+    """Tell whether an option that has a default was given."""
+    return click.get_current_context().get_parameter_source(option) is not ParameterSource.DEFAULT
 
 
 def _refuse_contradictions(table: str | None, instead: Mapping[str, bool], of_table: Mapping[str, object]) -> None:
@@ -143,6 +154,8 @@ def _refuse_contradictions(table: str | None, instead: Mapping[str, bool], of_ta
         ("--collect", "--row", "shows all rows"),
         ("--estimate", "--docs", "makes no files"),
         ("--runs", "--docs", "makes no files"),
+        ("--collect", "--jobs", "runs nothing"),
+        ("--runs", "--jobs", "runs nothing"),
     ):
         if mode in modes and other in others:
             message = f"{mode} {why}, so {other} has no meaning beside it; leave out one of them."
@@ -169,39 +182,26 @@ def _refuse_unknown(table: str | None, budget: str, rows: Sequence[str]) -> None
             raise UnknownNameError.of("row", name, names)
 
 
-def _show(
-    table: "Table",
-    budget: Budget,
-    command: str,
-    jobs: "Mapping[str, Sequence[Job]]",
-    out: Path,
-    docs: Path | None,
-    *,
-    seeds: str | None,
-    as_json: bool,
-) -> None:
+def _show(results: "Results", out: Path, docs: Path | None, *, only_collect: bool, as_json: bool) -> None:
     """Write the table's files, and print it.
 
     Raises:
-        InvalidValueError: There is nothing to write, or the files in `docs` have more results.
+        InvalidValueError: There is nothing to write, or it would replace files that have more results.
     """
-    from hoz_dist.cli.reproducing.results import Results
     from hoz_dist.cli.reproducing.sessions import read_sessions
 
-    results = Results.read(table, budget, command, jobs, out, seeds=seeds)
     if not results.summaries:
         message = (
             f"'{out}' has no results of '{results.stem}'; leave out --collect to make them, or choose another --out."
         )
         raise InvalidValueError(message)
+    if only_collect:  # what was trained just now is written in any case
+        results.refuse_to_replace_more(out)
+    sessions = [one for one in read_sessions(out) if results.is_session(one)]
+    paths = results.write(out, sessions)
     if docs is not None:
         results.refuse_to_replace_more(docs)
-    sessions = [
-        one
-        for one in read_sessions(out)
-        if (one["table"], one.get("budget"), str(one.get("seeds"))) == (table.name, budget.name, str(seeds))
-    ]
-    paths = [path for folder in (out, docs) if folder is not None for path in results.write(folder, sessions)]
+        paths += results.write(docs, sessions)
     if as_json:
         echo_json(results.to_json())
     else:

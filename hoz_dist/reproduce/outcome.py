@@ -141,12 +141,15 @@ class Outcome:
             if values["format"] != FORMAT:
                 message = f"format {values['format']}"
                 raise ValueError(message)  # noqa: TRY301 - one handler for all kinds of damage
+            if not isinstance(values["facts"], dict):
+                message = "facts are no JSON object"
+                raise ValueError(message)  # noqa: TRY301, TRY004 - as above
             columns: dict[str, Any] = {
-                **{name: np.array(values[name], dtype=np.int64) for name in (*_OF_EPISODES, "actions", "moves")},
+                **{name: _integers(values[name]) for name in (*_OF_EPISODES, "actions", "moves")},
                 **{name: np.array([_flags(one) for one in values[name]]) for name in ("success", "said_done")},
             }
             return cls(rooms=tuple(values["rooms"]), facts=values["facts"], **columns)
-        except (ValueError, KeyError, TypeError, AttributeError, OverflowError) as error:
+        except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError) as error:
             message = f"'{path}' holds no results of episodes ({error}); delete it, and what it held is done again."
             raise DamagedFileError(message) from error
 
@@ -155,5 +158,16 @@ def _letters(flags: NDArray[np.bool_]) -> str:
     return "".join("1" if flag else "0" for flag in flags)
 
 
+def _integers(values: object) -> NDArray[np.int64]:
+    array = np.array(values)
+    if array.dtype != np.int64:  # fractions would be cut off
+        message = "numbers that are no integers"
+        raise ValueError(message)
+    return array
+
+
 def _flags(letters: str) -> NDArray[np.bool_]:
+    if not set(letters) <= {"0", "1"}:
+        message = "truth values other than 0 and 1"
+        raise ValueError(message)
     return np.array([letter == "1" for letter in letters], dtype=np.bool_)

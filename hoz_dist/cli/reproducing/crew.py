@@ -12,7 +12,7 @@ from hoz_dist.cli.processes import MOST_RESTARTS
 from hoz_dist.cli.progress import Progress
 from hoz_dist.cli.reproducing.task import Place, Report, frames_of, perform
 from hoz_dist.cli.reproducing.worker import OUR_MISTAKE, Failure, Worker
-from hoz_dist.errors import HozError, OwnMistakeError
+from hoz_dist.errors import DamagedFileError, HozError, OwnMistakeError
 from hoz_dist.reproduce.costs import Costs, makespan
 from hoz_dist.reproduce.job import Task
 
@@ -103,11 +103,20 @@ def seconds_left(tasks: Sequence[Task], place: Place, costs: Costs) -> list[floa
         costs.of_task(
             task,
             task.waiting(place.out),
-            0 if task.training is None else frames_of(task.training, place.out),
+            _frames_made(task, place),
             chosen=task.training is not None and task.jobs[0].choice(place.out).exists(),
         )
         for task in tasks
     ]
+
+
+def _frames_made(task: Task, place: Place) -> int:
+    if task.training is None:
+        return 0
+    try:
+        return frames_of(task.training, place.out)
+    except DamagedFileError:
+        return 0  # its own process says so, and keeps no other from being done
 
 
 def run_tasks(tasks: Sequence[Task], place: Place, jobs: int, costs: Costs) -> None:

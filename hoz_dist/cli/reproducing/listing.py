@@ -51,7 +51,9 @@ def list_runs(jobs: Sequence[Job], out: Path, *, as_json: bool) -> None:
     tested = [job.training.folder(out) for job in jobs if job.training is not None and job.result(out).exists()]
     folders = [str(folder) for folder in dict.fromkeys(tested) if folder.is_dir()]
     if not folders:
-        message = f"'{out}' has no finished run of these rows; train them first, by the same command without --runs."
+        lack = "results of these rows, but not their runs" if tested else "no finished run of these rows"
+        where = "in another --out" if tested else "first"  # with their results there, nothing is trained
+        message = f"'{out}' has {lack}; train them {where}, by the same command without --runs."
         raise InvalidValueError(message)
     if as_json:
         echo_json(folders)

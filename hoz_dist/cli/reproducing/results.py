@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from hoz_dist.atomic import write_atomically
+from hoz_dist.cli.reproducing.outcomes import read_outcomes
 from hoz_dist.errors import InvalidValueError
 from hoz_dist.reproduce.budget import Budget
 from hoz_dist.reproduce.job import Job
@@ -54,12 +55,10 @@ class Results:
             seeds: Which seeds each row is trained with, as `--seeds` has it; None when they are as the budget says.
 
         Raises:
-            DamagedFileError: A file holds no outcome.
+            DamagedFileError: A file holds no outcome, or that of another job.
+            InvalidValueError: Outcomes cannot be compared.
         """
-        outcomes = {
-            name: {job.seed: Outcome.load(job.result(out)) for job in of_row if job.result(out).exists()}
-            for name, of_row in jobs.items()
-        }
+        outcomes = read_outcomes(jobs, out)
         # Baselines are not trained, and like nobody else.
         agents = {
             name: name if of_row[0].training is None else of_row[0].training.digest for name, of_row in jobs.items()
@@ -134,23 +133,30 @@ class Results:
             },
         }
 
+    def is_session(self, noted: Mapping[str, Any]) -> bool:
+        """Tell whether a start of the command, as it was noted, was for this table."""
+        ours = (self.table.name, self.budget.name, str(self.seeds))
+        return (noted["table"], noted.get("budget"), str(noted.get("seeds"))) == ours
+
     def refuse_to_replace_more(self, folder: Path) -> None:
-        """Keep the table's files in a folder from being replaced by what has fewer results.
+        """Keep the table's files in a folder from being replaced by what lacks some of their results.
 
         Raises:
             InvalidValueError: They would be.
         """
         file = folder / f"{self.stem}.json"
         try:
-            rows = json.loads(file.read_text("utf-8"))["rows"].values()
-            there = sum(len(row["runs"]) for row in rows)
-        except (FileNotFoundError, ValueError, KeyError, TypeError, AttributeError):
+            rows = json.loads(file.read_text("utf-8"))["rows"]
+            there = [(name, int(seed)) for name, row in rows.items() for seed in row["runs"]]
+        except (FileNotFoundError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
             return  # nothing, or nothing of ours that is worth keeping
-        here = sum(map(len, self.outcomes.values()))
-        if here < there:
+        lost = [(name, seed) for name, seed in there if seed not in self.outcomes.get(name, {})]
+        if lost:
+            (name, seed), others = lost[0], len(lost) - 1
+            what = f"that of '{name}' with seed {seed}" + (f" and {others} others" if others else "")
             message = (
-                f"'{file}' is of {there} results and would be replaced by {here}; finish the table, or choose another "
-                "--docs."
+                f"'{file}' has {len(there)} results, and what would replace it lacks {what}; finish the table, choose "
+                "another folder, or delete the file first."
             )
             raise InvalidValueError(message)
 
@@ -161,15 +167,15 @@ class Results:
             folder: Where to put them; made when it is not there.
             sessions: How long each start of the command was expected to take, and took.
         """
-        folder.mkdir(parents=True, exist_ok=True)
-        paths = [folder / f"{self.stem}.md", folder / f"{self.stem}.json"]
-        write_atomically(paths[0], self.text().encode(), overwrite=True)
         text = json.dumps(self.to_json() | {"sessions": list(sessions)}, indent=2) + "\n"
-        write_atomically(paths[1], text.encode(), overwrite=True)
+        contents = {"md": self.text().encode(), "json": text.encode()}
         if self.summaries:
             from hoz_dist.reproduce.plot import table_figure
             from hoz_dist.viz.zones import png
 
-            paths.append(folder / f"{self.stem}.png")
-            write_atomically(paths[2], png(table_figure(self.table, self.summaries)), overwrite=True)
-        return paths
+            contents["png"] = png(table_figure(self.table, self.summaries))
+        folder.mkdir(parents=True, exist_ok=True)
+        paths = {folder / f"{self.stem}.{suffix}": content for suffix, content in contents.items()}
+        for path, content in paths.items():  # all are made by now, so that none is new beside old ones
+            write_atomically(path, content, overwrite=True)
+        return list(paths)

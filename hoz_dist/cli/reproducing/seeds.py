@@ -18,7 +18,7 @@ class SeedsType(click.ParamType[range]):
         """Return the seeds."""
         if isinstance(value, range):
             return value
-        match = re.fullmatch(r"(?:(\d+)-)?(\d+)", value)
+        match = re.fullmatch(r"(?:(\d{1,4})-)?(\d{1,4})", value)
         if match is None:
             self.fail(f"'{value}' is neither a number of seeds nor FIRST-LAST, such as 5-14.", param, ctx)
         first, last = match.groups()

@@ -29,6 +29,8 @@ class Session:
     def __init__(self, out: Path, facts: Mapping[str, Any]) -> None:
         self._file = out / FILE
         self._before = read_sessions(out)
+        if not self._before and self._file.exists():
+            self._file.replace(self._file.with_suffix(".damaged"))  # for people: most of it may still be legible
         self._facts = facts
         self._began = time.monotonic()
         self._ended = threading.Event()
@@ -75,6 +77,6 @@ def read_sessions(out: Path) -> list[dict[str, Any]]:
     """
     try:
         sessions = json.loads((out / FILE).read_text("utf-8"))
-    except (FileNotFoundError, ValueError):
+    except (FileNotFoundError, ValueError, RecursionError):
         return []
     return [one for one in sessions if isinstance(one, dict) and "table" in one] if isinstance(sessions, list) else []

@@ -102,8 +102,12 @@ def _train(training: Training, place: Place, tell: Tell) -> None:
 
     folder = training.folder(place.out)
     tell(Report("training"))
-    if frames_of(training, place.out) >= training.frames:
-        return
+    try:
+        if frames_of(training, place.out) >= training.frames:
+            return
+    except DamagedFileError as error:
+        message = f"{error} Delete the folder '{folder}' to have it trained anew."
+        raise DamagedFileError(message) from error
     folder.parent.mkdir(parents=True, exist_ok=True)
     config = folder.with_name(f"{folder.name}.config.json")
     _write_json(config, training.config.to_json())
@@ -238,7 +242,9 @@ def _read_json(path: Path) -> dict[str, Any]:
     except ValueError as error:
         message = f"'{path}' is damaged ({error}); delete it, and what it held is done again."
         raise DamagedFileError(message) from error
-    if not isinstance(value, dict) or "checkpoint" not in value:
-        message = f"'{path}' does not name a checkpoint; delete it, and what it held is done again."
+    if not isinstance(value, dict) or not value.keys() >= {"checkpoint", "seconds"}:
+        message = (
+            f"'{path}' does not say what was chosen, and how long that took; delete it, and what it held is done again."
+        )
         raise DamagedFileError(message)
     return value

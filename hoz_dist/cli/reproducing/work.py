@@ -14,6 +14,7 @@ from hoz_dist.cli.progress import duration
 from hoz_dist.cli.rendering import Encoding, render_missing
 from hoz_dist.cli.reproducing.costs import measure_costs
 from hoz_dist.cli.reproducing.crew import run_tasks, seconds_left
+from hoz_dist.cli.reproducing.outcomes import refuse_lost_runs
 from hoz_dist.cli.reproducing.sessions import Session
 from hoz_dist.cli.reproducing.task import Place
 from hoz_dist.errors import InvalidValueError
@@ -68,6 +69,7 @@ def work_off(
     """
     place, began = Place(out, cache or default_cache()), time.monotonic()
     tasks = [task for task in tasks_of(jobs, out) if task.waiting(out)]
+    refuse_lost_runs(tasks, out)
     if not tasks:
         if only_estimate:
             if as_json:

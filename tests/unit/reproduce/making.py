@@ -1,8 +1,11 @@
 """Outcomes and tables for tests."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from hoz_dist.reproduce.budget import Budget
+from hoz_dist.reproduce.job import Job
 from hoz_dist.reproduce.outcome import Outcome
 from hoz_dist.reproduce.row import Row, Table
 
@@ -19,6 +22,15 @@ TABLE = Table(
         Row(name="hoz", agent="hoz", more_seeds=True),
     ),
 )
+
+
+def outcome_of(job: Job, skill: float = 0.6, seconds: float = 60.0) -> Outcome:
+    """What a job may leave; its training took this long."""
+    outcome = make_outcome(job.seed, job.protocol.trials, skill=skill)
+    facts = {**outcome.facts, "agent": job.agent}
+    if job.training is not None:
+        facts |= {"config": job.test_config.to_json(), "training_seconds": seconds}
+    return replace(outcome, facts=facts)
 
 
 def make_outcome(seed: int = 0, trials: int = 3, episodes: int = 80, skill: float = 0.6) -> Outcome:

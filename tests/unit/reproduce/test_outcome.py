@@ -67,6 +67,9 @@ def test_an_evaluation_is_kept_as_it_was(tmp_path: Path) -> None:
         {"moves": [[100] * 40] * 3},
         {"moves": [[0] * 40] * 3, "actions": [[0] * 40] * 3},
         {"facts": None, "actions": None},
+        {"facts": []},
+        {"success": ["x" * 40] * 3},
+        {"actions": [[30.7] * 40] * 3},
     ],
 )
 def test_what_does_not_fit_is_refused_in_one_sentence(tmp_path: Path, change: dict[str, Any]) -> None:

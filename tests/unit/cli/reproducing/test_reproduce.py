@@ -1,6 +1,8 @@
 import json
 import re
 import shutil
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -8,12 +10,14 @@ import pytest
 from filelock import FileLock
 
 from hoz_dist.cli.main import EXIT_USER_ERROR, run
+from hoz_dist.cli.reproducing.outcomes import read_outcomes
 from hoz_dist.cli.reproducing.results import Results
+from hoz_dist.errors import InvalidValueError
 from hoz_dist.reproduce.budget import BUDGETS
-from hoz_dist.reproduce.job import jobs_of
+from hoz_dist.reproduce.job import Job, jobs_of
 from hoz_dist.reproduce.outcome import METRICS
 from hoz_dist.reproduce.tables import TABLES
-from tests.unit.reproduce.making import TABLE, TINY, make_outcome
+from tests.unit.reproduce.making import TABLE, TINY, outcome_of
 
 DOCS = Path(__file__).parents[4] / "docs" / "results"
 
@@ -40,6 +44,11 @@ def test_without_a_table_all_are_listed(capsys: pytest.CaptureFixture[str]) -> N
         (["methods", "--seeds", "9-5"], "give FIRST before LAST"),
         (["--seeds", "5"], "--seeds is about one table"),
         (["methods", "--seeds", "5-100"], "'5-100' is no range of seeds from 0 to 99"),
+        (["methods", "--seeds", "9" * 5000], "is neither a number of seeds"),
+        (["--jobs", "2"], "--jobs is about one table"),
+        (["--out", "runs"], "--out is about one table"),
+        (["methods", "--collect", "--jobs", "2"], "--collect runs nothing, so --jobs"),
+        (["methods", "--runs", "--jobs", "2"], "--runs runs nothing, so --jobs"),
         (["methods", "--budget", "none"], "budget"),
         (["methods", "--row", "hoz2"], "row"),
         (["methods", "--row", "hoz", "--collect"], "--collect shows all rows, so --row"),
@@ -81,9 +90,75 @@ def test_published_results_are_not_replaced_by_fewer(tmp_path: Path, capsys: pyt
     assert run([*words, str(tmp_path / "whole")]) == 0
     published = {path: path.read_bytes() for path in (tmp_path / "docs").iterdir()}
     assert run([*words, str(tmp_path / "part")]) == EXIT_USER_ERROR
-    assert "is of 2 results and would be replaced by 1" in capsys.readouterr().err
+    lost = "has 2 results, and what would replace it lacks that of 'hoz' with seed 1;"
+    assert lost in capsys.readouterr().err
     assert {path: path.read_bytes() for path in (tmp_path / "docs").iterdir()} == published
+    assert (tmp_path / "part" / "zones-quick.md").exists()
     assert run([*words, str(tmp_path / "whole")]) == 0
+
+    # Nor are those of the folder itself, by the command that makes them again, nor by as many results of other rows.
+    hoz, other = (job for name in ("hoz", "K = 2") for job in zones_jobs(name)[:1])
+    hoz.result(tmp_path / "whole").unlink()
+    outcome_of(other).save(other.result(tmp_path / "whole"))
+    capsys.readouterr()
+    assert run(["reproduce", "zones", "--collect", "--out", str(tmp_path / "whole")]) == EXIT_USER_ERROR
+    assert "lacks that of 'hoz' with seed 0;" in capsys.readouterr().err
+    assert (tmp_path / "whole" / "zones-quick.json").read_bytes() == published[tmp_path / "docs" / "zones-quick.json"]
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        ({"agent": "object"}, "it is of the agent 'object'"),
+        ({"config": {}}, "it is of another configuration"),
+        ({"choice": None}, "it lacks choice.seconds"),
+        ({"choice": {}}, "it lacks choice.seconds"),
+        ({"test_seconds": None}, "it lacks test_seconds"),
+    ],
+)
+def test_results_of_something_else_are_refused_before_anything_is_trained(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], change: dict[str, Any], sentence: str
+) -> None:
+    job = zones_jobs("hoz")[1]
+    outcome = outcome_of(job)
+    replace(outcome, facts={**outcome.facts, **change}).save(job.result(tmp_path))
+    for more in (["--collect"], []):
+        assert run(["reproduce", "zones", "--out", str(tmp_path), *more]) == EXIT_USER_ERROR
+        said = capsys.readouterr().err
+        assert f"'{job.result(tmp_path)}' is not of 'hoz' with seed 1 ({sentence}); delete it" in said
+        assert said.count("\n") == 1
+
+
+def test_one_file_is_not_counted_twice(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    first, second = zones_jobs("hoz")
+    outcome_of(first).save(first.result(tmp_path))
+    shutil.copy(first.result(tmp_path), second.result(tmp_path))
+    assert run(["reproduce", "zones", "--collect", "--out", str(tmp_path)]) == EXIT_USER_ERROR
+    assert f"'{second.result(tmp_path)}' is not of 'hoz' with seed 1" in capsys.readouterr().err
+
+
+def test_two_trainings_are_not_compared_as_one_agent(tmp_path: Path) -> None:
+    jobs = {row.name: jobs_of(TABLE, row, TINY) for row in TABLE.rows}
+    hoz, other = jobs["hoz"][0], jobs["other order"][0]
+    outcome_of(hoz).save(hoz.result(tmp_path))
+    outcome_of(other, seconds=61.0).save(other.result(tmp_path))
+    with pytest.raises(InvalidValueError, match="are of two trainings of it") as error:
+        read_outcomes(jobs, tmp_path)
+    assert all(str(job.result(tmp_path)) in str(error.value) for job in (hoz, other))
+
+
+def test_an_agent_whose_run_is_gone_is_not_trained_anew_for_one_more_test(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = TABLES["merge-order"].rows
+    job = jobs_of(TABLES["merge-order"], rows[-1], BUDGETS["quick"])[0]
+    outcome_of(job).save(job.result(tmp_path))
+    words = ["reproduce", "merge-order", "--out", str(tmp_path), "--row", rows[0].name, "--row", rows[-1].name]
+    assert run(words) == EXIT_USER_ERROR
+    said = capsys.readouterr().err
+    assert f"'{job.result(tmp_path)}' is there, but not the run that it is of, so '{rows[0].name}' would be" in said
+    assert run(["reproduce", "merge-order", "--runs", "--out", str(tmp_path)]) == EXIT_USER_ERROR
+    assert "has results of these rows, but not their runs; train them in another --out" in capsys.readouterr().err
 
 
 def test_runs_that_are_trained_and_tested_are_listed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -93,7 +168,7 @@ def test_runs_that_are_trained_and_tested_are_listed(tmp_path: Path, capsys: pyt
         job.training.folder(tmp_path).mkdir(parents=True)
     tested = [rows["random"][0], rows["object"][0], *rows["hoz"]]
     for job in tested:
-        make_outcome().save(job.result(tmp_path))
+        outcome_of(job).save(job.result(tmp_path))
     folders = [str(job.training.folder(tmp_path)) for job in tested if job.training is not None]
 
     assert run(["reproduce", "methods", "--runs", "--out", str(tmp_path)]) == 0
@@ -105,8 +180,8 @@ def test_runs_that_are_trained_and_tested_are_listed(tmp_path: Path, capsys: pyt
 def test_results_are_read_written_and_counted_once(tmp_path: Path) -> None:
     jobs = {row.name: jobs_of(TABLE, row, TINY) for row in TABLE.rows}
     for seed, job in enumerate(jobs["hoz"][:2]):
-        make_outcome(seed).save(job.result(tmp_path))
-        make_outcome(seed, skill=0.5).save(jobs["other order"][seed].result(tmp_path))
+        outcome_of(job).save(job.result(tmp_path))
+        outcome_of(jobs["other order"][seed], skill=0.5).save(jobs["other order"][seed].result(tmp_path))
     results = Results.read(TABLE, TINY, "hoz-dist reproduce some", jobs, tmp_path)
     assert {name: list(by_seed) for name, by_seed in results.outcomes.items()} == {
         "random": [],
@@ -204,11 +279,17 @@ def test_files_for_the_documentation_are_those_of_the_folder(
     assert (json.loads(out)["unfinished"], json.loads(out)["hours"]) == ({}, published["hours"])
 
 
+def zones_jobs(name: str) -> Sequence[Job]:
+    """The jobs of a row of the table `zones` at `quick`."""
+    row = next(row for row in TABLES["zones"].rows if row.name == name)
+    return jobs_of(TABLES["zones"], row, BUDGETS["quick"])
+
+
 def save_outcomes(table: str, budget: str, seeds: range, out: Path) -> None:
     """Have runs of `hoz` finished."""
     row = next(row for row in TABLES[table].rows if row.name == "hoz")
     for job in jobs_of(TABLES[table], row, BUDGETS[budget], seeds):
-        make_outcome(job.seed).save(job.result(out))
+        outcome_of(job).save(job.result(out))
 
 
 def means(results: dict[str, Any]) -> dict[str, dict[str, float]]:

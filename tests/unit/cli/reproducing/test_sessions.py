@@ -52,3 +52,7 @@ def test_what_ended_a_session_is_known_when_it_cannot_be_noted(tmp_path: Path) -
 def test_a_damaged_file_is_as_none(tmp_path: Path, text: str) -> None:
     (tmp_path / "sessions.json").write_text(text)
     assert read_sessions(tmp_path) == []
+    with Session(tmp_path, {"table": "some"}):
+        pass
+    assert len(read_sessions(tmp_path)) == 1
+    assert (tmp_path / "sessions.damaged").read_text() == text  # what people can still read in it is not lost

@@ -13,14 +13,17 @@ from hoz_dist.cli.processes import MOST_RESTARTS
 from hoz_dist.cli.reproducing import crew as reproduce_crew
 from hoz_dist.cli.reproducing import work as reproduce_work
 from hoz_dist.cli.reproducing.sessions import read_sessions
+from hoz_dist.cli.reproducing.task import Place, perform
 from hoz_dist.cli.reproducing.worker import Failure
+from hoz_dist.errors import HozError
 from hoz_dist.nav.rooms import RoomId
 from hoz_dist.reproduce.budget import BUDGETS
 from hoz_dist.reproduce.costs import Costs, Speed
-from hoz_dist.reproduce.job import Task
+from hoz_dist.reproduce.job import Task, jobs_of
 from hoz_dist.reproduce.tables import TABLES
+from learner.checkpoint import FOLDER
 from tests.unit.cli.reproducing.workers import Worked
-from tests.unit.reproduce.making import TABLE, TINY, make_outcome
+from tests.unit.reproduce.making import TABLE, TINY, outcome_of
 
 Start = Callable[[Task], Worked]
 
@@ -164,6 +167,30 @@ def test_a_task_that_fails_again_keeps_no_other_from_being_done(
     assert [task.name for task in again] == ["object, seed 0", "other order, seed 1"]
 
 
+def test_a_damaged_run_keeps_no_other_from_being_done(
+    tmp_path: Path, command: Callable[..., int], capsys: pytest.CaptureFixture[str]
+) -> None:
+    job = jobs_of(TABLE, TABLE.rows[1], TINY)[0]
+    assert job.training is not None
+    run_folder = job.training.folder(tmp_path)
+    (run_folder / FOLDER).mkdir(parents=True)
+    (run_folder / FOLDER / "0001-000000020.safetensors").write_bytes(b"junk")
+    done: list[str] = []
+
+    def start(task: Task) -> Worked:
+        try:
+            if task.training == job.training:
+                perform(task, Place(tmp_path, tmp_path), lambda _: None)
+        except HozError as error:
+            return Worked(1, [Failure(str(error))])
+        done.append(task.name)
+        return finished(task, tmp_path)
+
+    assert command(start) == EXIT_USER_ERROR
+    assert len(done) == 4
+    assert capsys.readouterr().err.endswith(f"Delete the folder '{run_folder}' to have it trained anew.\n")
+
+
 def test_a_mistake_of_ours_ends_the_command_at_once(
     tmp_path: Path, command: Callable[..., int], capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -185,5 +212,5 @@ def test_a_mistake_of_ours_ends_the_command_at_once(
 def finished(task: Task, out: Path) -> Worked:
     """A process that has done its task."""
     for job in task.jobs:
-        make_outcome(job.seed).save(job.result(out))
+        outcome_of(job).save(job.result(out))
     return Worked(0)
