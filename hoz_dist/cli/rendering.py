@@ -2,6 +2,8 @@
 
 import io
 import multiprocessing
+import os
+import signal
 from collections.abc import Iterable, Sequence
 from multiprocessing.process import BaseProcess
 from multiprocessing.queues import Queue, SimpleQueue
@@ -11,6 +13,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from hoz_dist.cli.child import die_with_parent
 from hoz_dist.cli.progress import Progress
 from hoz_dist.cli.spawning import start_shielded
 from hoz_dist.errors import HozError, InvalidValueError
@@ -70,7 +73,7 @@ def render_rooms(rooms: Sequence[RoomId], cache: Path, picture_size: int, jobs: 
     count = min(jobs, len(rooms))
     for task in [*rooms, *[None] * count]:
         tasks.put(task)
-    arguments = (tasks, reports, cache, picture_size, encoding)
+    arguments = (os.getpid(), tasks, reports, cache, picture_size, encoding)
     workers = [context.Process(target=_render, args=arguments, daemon=True) for _ in range(count)]
     start_shielded(workers)
     try:
@@ -148,6 +151,7 @@ def contact_sheet(rooms: Iterable[RoomId], store: ViewStore) -> bytes:
 
 
 def _render(
+    parent: int,
     tasks: "SimpleQueue[RoomId | None]",
     reports: "Queue[_Report]",
     cache: Path,
@@ -155,6 +159,9 @@ def _render(
     encoding: Encoding,
 ) -> None:
     """Fill the cache for one room after another; the body of a rendering process."""
+    # A parent that is killed ends nobody. Nor could this process end by itself: it holds the reading end of its own
+    # reports, and would wait for ever for somebody to read them. The store takes no harm from a SIGKILL.
+    die_with_parent(parent, signal.SIGKILL)
     encoder, store = load_encoder(*encoding), ViewStore(cache, picture_size)
     while (room := tasks.get()) is not None:
         rendered = False
