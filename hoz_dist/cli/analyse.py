@@ -48,9 +48,10 @@ def analyse_command(
     """Say why episodes of each RUN fail, where SPL is lost, and what the graph did.
 
     RUN is a checkpoint file, or a run folder for its newest checkpoint; `reproduce` tests another one, which
-    seed-N.choice-*.json beside the folder names. Runs that differ by their seed alone count as one method. All of them
-    run the same fixed episodes at the temperature that `evaluate` has by default, with Random and Oracle beside them.
-    docs/analysis.md explains each figure.
+    seed-N.choice-*.json beside the folder names. Runs that differ by their seed alone, and were
+    trained equally long in the same rooms, count as one method. All of them run the same fixed episodes at the
+    temperature that `evaluate` has by default, with Random and Oracle beside them. docs/analysis.md explains each
+    figure.
     """
     if curve and split == "test":
         message = "--curve compares checkpoints, which is for validation rooms; leave out --curve or --split test."

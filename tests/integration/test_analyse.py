@@ -1,6 +1,7 @@
 """`hoz-dist analyse` on real validation rooms."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,8 @@ from hoz_dist import __version__
 from hoz_dist.cli.main import run
 from hoz_dist.config import RunConfig
 from hoz_dist.evaluation.protocol import EPISODE_SEED, TEMPERATURE
-from learner.checkpoint import FOLDER
+from learner.checkpoint import FOLDER, load_checkpoint, save_checkpoint
+from tests.integration.learning import graph_of
 from tests.integration.runs import save_run
 
 pytestmark = pytest.mark.integration
@@ -122,3 +124,17 @@ def test_a_users_mistake_is_one_sentence(
         assert out == ""
         assert err.startswith(f"hoz-dist: {said}")
         assert err.count("\n") == 1
+
+
+def test_seeds_that_were_trained_in_other_rooms_are_not_pooled(
+    runs: Path, cache: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    other = save_run(tmp_path / "other", RunConfig(seed=2))
+    elsewhere = replace(load_checkpoint(other), rooms=(graph_of("bathroom/2", zones=RunConfig().zones),))
+    save_checkpoint(other / FOLDER, elsewhere)
+    paths = [runs / "hoz-0", runs / "hoz-1", other]
+    assert run([*words_for(cache, *paths), "--json"]) == 0
+    results: dict[str, Any] = json.loads(capsys.readouterr().out)
+    ours, theirs = f"hoz ({paths[0]})", f"hoz ({other})"
+    assert [of_run["method"] for of_run in results["runs"]] == [ours, ours, theirs]
+    assert [results["methods"][name]["all"]["trials"] for name in (ours, theirs)] == [2, 1]

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hoz_dist.cli.analysing.naming import method_names
+from hoz_dist.cli.analysing.naming import Training, method_names
 from hoz_dist.cli.measure import open_benchmark
 from hoz_dist.errors import InvalidValueError, NotFoundError
 from hoz_dist.evaluation.benchmark import Benchmark
@@ -21,7 +21,7 @@ class Run(NamedTuple):
     path: Path
     """The run folder or the checkpoint, as the user names it."""
     method: str
-    """Its name in tables and pictures; runs that differ by their seed alone share it."""
+    """Its name in tables and pictures; runs that differ by their seed alone share it, see `method_names`."""
     checkpoint: Checkpoint
     kept: tuple[Path, ...]
     """The checkpoints of its curve, by version; none when no curve is wanted."""
@@ -56,7 +56,7 @@ def open_runs(
     checkpoints = [load_checkpoint(path) for path in paths]
     _refuse_duplicates(paths, checkpoints)
     kept = [_kept(path) if with_kept else () for path in paths]
-    names = method_names(paths, [checkpoint.config for checkpoint in checkpoints])
+    names = method_names(paths, [_training(checkpoint) for checkpoint in checkpoints])
     benchmarks = [
         open_benchmark(checkpoint, split=split, episodes=episodes, scenes=scenes, weights=weights, cache=cache)
         for checkpoint in checkpoints
@@ -81,6 +81,11 @@ def _refuse_duplicates(paths: Sequence[Path], checkpoints: Sequence[Checkpoint])
         if one.config == other.config and np.array_equal(one.parameters, other.parameters):
             message = f"'{path}' and '{other_path}' are the same checkpoint; name it once."
             raise InvalidValueError(message)
+
+
+def _training(checkpoint: Checkpoint) -> Training:
+    rooms = frozenset((room.room, room.digest) for room in checkpoint.rooms)
+    return Training(checkpoint.config, checkpoint.frames, rooms)
 
 
 def _kept(path: Path) -> tuple[Path, ...]:
