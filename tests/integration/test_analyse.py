@@ -1,6 +1,7 @@
 """`hoz-dist analyse` on real validation rooms."""
 
 import json
+import shutil
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -8,9 +9,12 @@ from typing import Any
 import pytest
 
 from hoz_dist import __version__
+from hoz_dist.cli.analysing import tracing
 from hoz_dist.cli.main import run
 from hoz_dist.config import RunConfig
+from hoz_dist.errors import InvalidValueError
 from hoz_dist.evaluation.protocol import EPISODE_SEED, TEMPERATURE
+from hoz_dist.viz import analysis
 from learner.checkpoint import FOLDER, load_checkpoint, save_checkpoint
 from tests.integration.learning import graph_of
 from tests.integration.runs import save_run
@@ -124,6 +128,48 @@ def test_a_users_mistake_is_one_sentence(
         assert out == ""
         assert err.startswith(f"hoz-dist: {said}")
         assert err.count("\n") == 1
+
+
+def test_what_stands_against_a_result_is_said_before_any_episode(
+    runs: Path, cache: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tracing, "trace_runs", lambda *_: pytest.fail("episodes are run"))
+    (tmp_path / "file").touch()
+    (tmp_path / "taken" / "failures.png").mkdir(parents=True)
+    damaged = Path(shutil.copytree(runs / "object-0", tmp_path / "damaged"))
+    file = next((damaged / FOLDER).glob("*.safetensors"))
+    older = file.with_name("0000-000000000.safetensors")
+    older.write_bytes(file.read_bytes()[:-1])
+    older.with_suffix(".keep").touch()
+    file.rename(newer := file.with_name("0001-000000001.safetensors"))
+    newer.with_suffix(".keep").touch()
+    good = words_for(cache, runs / "hoz-0")
+    for words, said in (
+        ([*good, "--out", str(tmp_path / "file" / "new")], f"Nothing can be written to '{tmp_path}/file/new' (Not a"),
+        ([*good, "--out", "/proc"], "Nothing can be written to '/proc' ("),  # not even by root
+        ([*good, "--out", str(tmp_path / "taken")], f"'{tmp_path}/taken/failures.png' is a folder; name a file"),
+        ([*words_for(cache, damaged), "--curve"], f"--curve needs '{older}', which is damaged; leave out --curve, or"),
+    ):
+        assert run(words) == 2
+        out, err = capfd.readouterr()
+        assert out == ""
+        assert err.startswith(f"hoz-dist: {said}")
+        assert err.count("\n") == 1
+
+
+def test_a_picture_that_fails_costs_no_figure(
+    runs: Path, cache: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full_disk(*_: object) -> None:
+        message = "The disk is full."
+        raise InvalidValueError(message)
+
+    monkeypatch.setattr(analysis, "failure_figure", full_disk)
+    assert run([*words_for(cache, runs / "hoz-0"), "--out", str(tmp_path)]) == 2
+    out, err = capsys.readouterr()
+    assert err.endswith("hoz-dist: The disk is full.\n")
+    assert "12 episodes on unseen validation rooms; runs: hoz 1;" in " ".join(out.split())
+    assert "hoz" in json.loads((tmp_path / "analysis.json").read_text())["methods"]
 
 
 def test_seeds_that_were_trained_in_other_rooms_are_not_pooled(

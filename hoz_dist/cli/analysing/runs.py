@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from hoz_dist.cli.analysing.naming import Training, method_names
-from hoz_dist.cli.measure import open_benchmark
-from hoz_dist.errors import InvalidValueError, NotFoundError
+from hoz_dist.cli.measure import agent_of, open_benchmark
+from hoz_dist.errors import DamagedFileError, InvalidValueError, NotFoundError
 from hoz_dist.evaluation.benchmark import Benchmark
 from hoz_dist.nav.rooms import Split
 from learner.checkpoint import Checkpoint, kept_checkpoints, load_checkpoint
@@ -39,7 +39,7 @@ def open_runs(
     cache: Path | None,
     with_kept: bool,
 ) -> list[Run]:
-    """Read runs and draw their episodes.
+    """Read runs and draw their episodes; what cannot be used is found out here, before hours of episodes.
 
     Args:
         paths: Run folders or checkpoints, at least one.
@@ -51,7 +51,8 @@ def open_runs(
         with_kept: Whether curves are wanted.
 
     Raises:
-        HozError: A run cannot be read, is there twice, keeps no checkpoint, or the runs cannot have the same episodes.
+        HozError: A run, or a checkpoint of its curve, cannot be used, a run is there twice or keeps no checkpoint, or
+            the runs cannot have the same episodes.
     """
     checkpoints = [load_checkpoint(path) for path in paths]
     _refuse_duplicates(paths, checkpoints)
@@ -68,6 +69,8 @@ def open_runs(
                 "pictures; name common scenes by --scene, or analyse them one by one."
             )
             raise InvalidValueError(message)
+    for checkpoint in checkpoints:
+        agent_of(checkpoint)
     return [Run(*parts) for parts in zip(paths, names, checkpoints, kept, benchmarks, strict=True)]
 
 
@@ -89,12 +92,12 @@ def _training(checkpoint: Checkpoint) -> Training:
 
 
 def _kept(path: Path) -> tuple[Path, ...]:
-    """Return the checkpoints of a run's curve.
+    """Return the checkpoints of a run's curve, all of which can be used.
 
     Raises:
         InvalidValueError: It is one checkpoint.
         NotFoundError: There is none.
-        UnreadableError: The folder cannot be read now.
+        HozError: One is damaged, or cannot be used or read now.
     """
     if path.is_file():
         message = f"--curve needs run folders, and '{path}' is a file; leave out --curve, or give the run's folder."
@@ -103,4 +106,10 @@ def _kept(path: Path) -> tuple[Path, ...]:
     if not kept:
         message = f"'{path}' keeps no checkpoint for a curve; give a run folder that was trained with --keep-every."
         raise NotFoundError(message)
+    for file in kept:
+        try:
+            agent_of(load_checkpoint(file))
+        except DamagedFileError as error:
+            message = f"--curve needs '{file}', which is damaged; leave out --curve, or delete this file."
+            raise DamagedFileError(message) from error
     return kept
