@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from hoz_dist.reproduce.bootstrap import REPLICATES, Resampling, degrees_of_freedom
+from hoz_dist.reproduce.bootstrap import REPLICATES, Resampling, degrees_of_freedom, stretch
 
 
 def alone(episodes: int, replicates: int = REPLICATES) -> Resampling:
@@ -15,9 +15,9 @@ def normal_width(deviation: float) -> float:
     return 2 * 1.96 * deviation
 
 
-def student_width(of_seeds: np.ndarray) -> float:
-    """Width of a 95% interval of the mean of a few seeds."""
-    return float(2 * stats.t.ppf(0.975, len(of_seeds) - 1) * stats.sem(of_seeds))
+def student_width(of_seeds: np.ndarray, confidence: float = 0.95) -> float:
+    """Width of an interval of the mean of a few seeds."""
+    return float(2 * stats.t.ppf((1 + confidence) / 2, len(of_seeds) - 1) * stats.sem(of_seeds))
 
 
 def test_with_one_seed_it_is_scipys_bootstrap_over_episodes() -> None:
@@ -54,6 +54,30 @@ def test_seeds_that_differ_widen_the_interval_as_they_should() -> None:
     row, reference = np.tile(of_seeds[:, None], (1, 50)), np.full((5, 50), 0.3)
     interval = alone(50).interval(row, reference, same_seeds=False)
     assert interval.high - interval.low == pytest.approx(student_width(of_seeds), rel=0.1)
+
+
+@pytest.mark.parametrize("confidence", [0.5, 0.8, 0.9, 0.99])
+def test_an_interval_is_as_wide_as_the_confidence_asks(confidence: float) -> None:
+    # Of episodes alone, whose mean is normal.
+    episodes = np.random.default_rng(0).standard_normal(400)
+    of_episodes = alone(400).interval(episodes[None], np.zeros((1, 400)), same_seeds=True, confidence=confidence)
+    normal = 2 * stats.norm.ppf((1 + confidence) / 2) * episodes.std() / 400**0.5
+    assert of_episodes.high - of_episodes.low == pytest.approx(normal, rel=0.1)
+    # Of seeds alone, which are few.
+    of_seeds = np.random.default_rng(1).standard_normal(6)
+    row, reference = np.tile(of_seeds[:, None], (1, 50)), np.zeros((6, 50))
+    for same in (True, False):
+        interval = alone(50).interval(row, reference, same_seeds=same, confidence=confidence)
+        assert interval.high - interval.low == pytest.approx(student_width(of_seeds, confidence), rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("confidence", "student", "normal"), [(0.5, 0.741, 0.6745), (0.9, 2.132, 1.645), (0.95, 2.776, 1.960)]
+)
+def test_draws_of_seeds_are_stretched_as_the_confidence_asks(confidence: float, student: float, normal: float) -> None:
+    # Quantiles of Student's t with four degrees of freedom, and of the normal distribution, out of a book's tables.
+    assert stretch(5, 4, confidence) == pytest.approx((5 / 4) ** 0.5 * student / normal, rel=1e-3)
+    assert stretch(1, 4, confidence) == 1.0  # one seed tells of no variance
 
 
 def test_pairs_of_seeds_cancel_and_others_do_not() -> None:
@@ -125,6 +149,15 @@ def test_rooms_that_suit_one_row_are_not_taken_for_all_rooms(scenes: int, rooms:
             held[number] += interval.low <= 0.0 <= interval.high
     assert held[0] / 200 >= 0.89
     assert held[1] / 200 <= 0.85
+
+
+def test_each_scene_has_as_many_rooms_in_every_draw() -> None:
+    # Rooms of a scene are all alike, so that there is nothing uncertain, however much scenes differ.
+    room = np.repeat(np.arange(8), 10)
+    scene = np.repeat([0, 0, 0, 1, 1, 1, 1, 1], 10)  # of three rooms and of five
+    row = np.where(scene == 0, 1.0, 0.2)[None]
+    interval = Resampling(room, scene, 400).interval(row, np.zeros((1, 80)), same_seeds=True)
+    assert interval == pytest.approx((0.5, 0.5, 0.5), abs=1e-5)
 
 
 def test_the_same_data_give_the_same_interval() -> None:
