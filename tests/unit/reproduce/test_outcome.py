@@ -1,4 +1,5 @@
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -53,6 +54,25 @@ def test_an_evaluation_is_kept_as_it_was(tmp_path: Path) -> None:
     for name in ("success", "actions", "moves", "said_done"):
         np.testing.assert_array_equal(getattr(read, name), getattr(outcome, name))
     assert read.scene[:2].tolist() == ["kitchen", "bathroom"]
+
+
+def test_the_same_episodes_are_those_of_the_same_rooms_targets_and_lengths() -> None:
+    outcome = make_outcome()
+    assert outcome.same_episodes(make_outcome(seed=1, trials=2, skill=0.1))  # whatever came of them
+    assert outcome.same_episodes(replace(outcome, facts={}))
+    others = (
+        {"rooms": ("kitchen/26", "bathroom/28")},
+        {"rooms": ("bathroom/27", "kitchen/26")},
+        {"rooms": (*outcome.rooms, "bathroom/28")},
+        {"room": 1 - outcome.room},
+        {"target": (outcome.target + 1) % 22},
+        {"optimal": outcome.optimal + 1},
+    )
+    for change in others:
+        other = replace(outcome, **change)
+        assert not outcome.same_episodes(other), change
+        assert not other.same_episodes(outcome), change
+    assert not outcome.same_episodes(make_outcome(episodes=79))
 
 
 @pytest.mark.parametrize(
