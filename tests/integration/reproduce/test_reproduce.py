@@ -10,8 +10,10 @@ from pathlib import Path
 import pytest
 
 from hoz_dist.cli.main import run
+from hoz_dist.config import RunConfig
 from hoz_dist.nav.rooms import SPLITS
 from hoz_dist.reproduce.budget import BUDGETS
+from hoz_dist.reproduce.outcome import Outcome
 from hoz_dist.reproduce.tables import TABLES
 from hoz_dist.wire.transport.environment import child_environment
 from tests.integration.reproduce.tables import FEW_ROOMS, TINY_BUDGET, TINY_TABLE
@@ -59,7 +61,17 @@ def test_a_killed_command_goes_on_and_makes_the_table(
     for row in results["rows"].values():
         assert (row["trials"], row["episodes"]["all"]) == (2, 20)
         assert row["runs"]["0"]["frames"] >= 6000
-        assert len(row["runs"]["0"]["choice"]["candidates"]) == 2
+        candidates = row["runs"]["0"]["choice"]["candidates"]
+        assert len(candidates) == 2
+        best = max(candidates, key=lambda one: (one["sr"], one["spl"], one["frames"]))
+        assert row["runs"]["0"]["choice"]["checkpoint"] == best["checkpoint"]
+        assert row["runs"]["0"]["frames"] == best["frames"]
+        # Tested in rooms that nobody trained in or chose by.
+        outcome = Outcome.load(out / row["runs"]["0"]["file"])
+        assert outcome.rooms == tuple(f"bathroom/{number}" for number in FEW_ROOMS["test"])
+        assert outcome.success.shape == (2, 20)
+    orders = {name: row["runs"]["0"]["config"]["merge_order"] for name, row in results["rows"].items()}
+    assert orders == {"hoz": RunConfig().merge_order, "order 1": 1}
     assert set(results["rows"]["order 1"]["differences"]["hoz"]["all"]["sr"]) == {"difference", "low", "high"}
     assert "| order 1 |" in (out / "tiny-tiny.md").read_text()
     assert (out / "tiny-tiny.png").read_bytes().startswith(b"\x89PNG")
