@@ -15,11 +15,8 @@ from hoz_dist.cli.reproducing.results import Results
 from hoz_dist.errors import InvalidValueError
 from hoz_dist.reproduce.budget import BUDGETS
 from hoz_dist.reproduce.job import Job, jobs_of
-from hoz_dist.reproduce.outcome import METRICS
 from hoz_dist.reproduce.tables import TABLES
 from tests.unit.reproduce.making import TABLE, TINY, outcome_of
-
-DOCS = Path(__file__).parents[4] / "docs" / "results"
 
 
 def test_without_a_table_all_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
@@ -262,21 +259,16 @@ def test_a_second_command_on_one_folder_is_refused(tmp_path: Path, capsys: pytes
 def test_files_for_the_documentation_are_those_of_the_folder(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    shutil.copytree(DOCS, tmp_path / "out")
+    save_outcomes("methods", "quick", range(2), tmp_path / "out")
     words = ["--out", str(tmp_path / "out"), "--docs", str(tmp_path / "docs" / "new")]
     assert run(["reproduce", "methods", "--collect", *words, "--json"]) == 0
-    out, err = capsys.readouterr()
+    err = capsys.readouterr().err
 
     names = [f"methods-quick.{suffix}" for suffix in ("md", "json", "png")]
     for name in names:
         assert (tmp_path / "docs" / "new" / name).read_bytes() == (tmp_path / "out" / name).read_bytes()
     folders = (tmp_path / "out", tmp_path / "docs" / "new")
     assert err == f"Written: {', '.join(str(folder / name) for folder in folders for name in names)}\n"
-
-    # What is published is what the published outcomes of episodes say.
-    published = json.loads((DOCS / "methods-quick.json").read_text())
-    assert means(json.loads(out)) == means(published)
-    assert (json.loads(out)["unfinished"], json.loads(out)["hours"]) == ({}, published["hours"])
 
 
 def zones_jobs(name: str) -> Sequence[Job]:
@@ -290,11 +282,3 @@ def save_outcomes(table: str, budget: str, seeds: range, out: Path) -> None:
     row = next(row for row in TABLES[table].rows if row.name == "hoz")
     for job in jobs_of(TABLES[table], row, BUDGETS[budget], seeds):
         outcome_of(job).save(job.result(out))
-
-
-def means(results: dict[str, Any]) -> dict[str, dict[str, float]]:
-    """The mean of each metric, by row, over all episodes and the long ones."""
-    return {
-        name: {f"{part} {metric}": row[part][metric]["mean"] for part in ("all", "long") for metric in METRICS}
-        for name, row in results["rows"].items()
-    }
