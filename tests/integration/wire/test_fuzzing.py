@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from hoz_dist.client import HozClient
+from hoz_dist.gradient_forms import Bf16Gradient, Gradient
 from hoz_dist.nav.categories import TARGETS
 from hoz_dist.nav.rooms import RoomId
 from hoz_dist.wire.protocol.answers import Accepted, Refused
@@ -30,15 +31,20 @@ ROOM = RoomId("kitchen", 3)
 
 
 def gradients(parameters: Parameters) -> list[bytes]:
-    """Well-formed gradients that this learner must not apply, each for two reasons: a mutation may mend one."""
+    """Well-formed gradients that this learner must not apply, each for two reasons: a mutation may mend one.
+
+    Only the last is wrong by its norm alone, which the learner looks at when all else is right; no mutation mends that.
+    """
     epoch, version = parameters.head.stamp
     good, frames = gradient_for(parameters, 0), CONFIG.batch * CONFIG.rollout_steps + 1
-    wrong = (
+    wrong: tuple[tuple[int, int, int, Gradient], ...] = (
         (epoch + 1, version + 1, 20, good),
         (epoch, version + 1, frames, good),
         (epoch, version, 20, 1.1 * good[1000:]),
         (epoch, version, frames, 1.1 * good),
         (epoch, version, frames, np.full(100, 3e38, np.float32)),
+        (epoch, version, frames, Bf16Gradient(np.zeros(good.size, np.uint16))),
+        (epoch, version, 20, 1.1 * good),
     )
     return [encode(GradientPush(MALLORY, 66, sequence, *fields)) for sequence, fields in enumerate(wrong)]
 
