@@ -123,11 +123,7 @@ def test_a_users_mistake_is_one_sentence(
         (["analyse"], "Missing argument 'RUN...'."),
         ([*words_for(cache, runs / "object-0"), "--curve", "--split", "test"], "--curve compares checkpoints, which"),
     ):
-        assert run(words) == 2
-        out, err = capfd.readouterr()
-        assert out == ""
-        assert err.startswith(f"hoz-dist: {said}")
-        assert err.count("\n") == 1
+        refused(words, said, capfd)
 
 
 def test_what_stands_against_a_result_is_said_before_any_episode(
@@ -150,11 +146,7 @@ def test_what_stands_against_a_result_is_said_before_any_episode(
         ([*good, "--out", str(tmp_path / "taken")], f"'{tmp_path}/taken/failures.png' is a folder; name a file"),
         ([*words_for(cache, damaged), "--curve"], f"--curve needs '{older}', which is damaged; leave out --curve, or"),
     ):
-        assert run(words) == 2
-        out, err = capfd.readouterr()
-        assert out == ""
-        assert err.startswith(f"hoz-dist: {said}")
-        assert err.count("\n") == 1
+        refused(words, said, capfd)
 
 
 def test_a_picture_that_fails_costs_no_figure(
@@ -184,3 +176,12 @@ def test_seeds_that_were_trained_in_other_rooms_are_not_pooled(
     ours, theirs = f"hoz ({paths[0]})", f"hoz ({other})"
     assert [of_run["method"] for of_run in results["runs"]] == [ours, ours, theirs]
     assert [results["methods"][name]["all"]["trials"] for name in (ours, theirs)] == [2, 1]
+
+
+def refused(words: list[str], said: str, capfd: pytest.CaptureFixture[str]) -> None:
+    """Run a command that ends with one sentence and nothing else."""
+    assert run(words) == 2
+    out, err = capfd.readouterr()
+    assert out == ""
+    assert err.startswith(f"hoz-dist: {said}")
+    assert err.count("\n") == 1
